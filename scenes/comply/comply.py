@@ -199,7 +199,7 @@ def seat_glare(
 def seat_eye(
     room: RoomInputs, light: RoomLight, closed: NDArray[np.bool_] | None, tables: OperationTables | None
 ) -> tuple[EyeLight, list[str]]:
-    """Light at the eye of a room, whose scene has turned eyes, and notes.
+    """Light at the eye of a room, and notes.
 
     Args: closed: [H, G] as of `room_heat`; tables: the luminaires and colours of the room.
     """
@@ -457,7 +457,7 @@ class Check:
             space,
             self.systems,
             self.files.weather,
-            self.options.room.changed(spectral=eyes),
+            self.options.room,
             skies=skies,
             cache=cache,
             grids=distinct,

@@ -69,14 +69,9 @@ class RoomInputs:
     controller: Controller | None = None  # in place of the operation's rules of shading
 
     @property
-    def turned_eyes(self) -> int:
-        """Sensors at the eye that look in `EYE_TURNS`, the last of the scene's."""
-        return len(EYE_TURNS) if self.options.outputs.spectral else 0
-
-    @property
     def other_sensors(self) -> int:
         """Sensors of the scene that are not of the work plane: the last ones."""
-        return sum(len(grid.points) for grid in self.file_sensors.grids) + self.turned_eyes
+        return sum(len(grid.points) for grid in self.file_sensors.grids)
 
     @property
     def season(self) -> NDArray[np.int64]:

@@ -101,19 +101,37 @@ def _scene(room: RoomInputs, building: Building) -> tuple[DaylightScene, InnerGl
         inner=glass,
         file_sensors=room.file_sensors,
     )
-    return with_turned_eyes(scene) if room.turned_eyes else scene, glass
+    return scene, glass
 
 
-def with_turned_eyes(scene: DaylightScene) -> DaylightScene:
-    """The scene with sensors at its eye, after all others, that look in `EYE_TURNS`."""
+def turned_eyes(light: RoomLight) -> RoomLight:
+    """The light of sensors at the room's eye that look in `EYE_TURNS`.
+
+    They are traced by themselves: sensors that are traced together share paths, and the light of the
+    others would change.
+    """
+    scene = light.scene
     position, direction = (np.asarray(a, dtype=float) for a in (scene.eye.position, scene.eye.direction))
     angle = np.radians(EYE_TURNS)
     x, y, z = direction
     turned = np.stack(
         [np.cos(angle) * x - np.sin(angle) * y, np.sin(angle) * x + np.cos(angle) * y, np.full_like(angle, z)], axis=1
     )
-    points = np.concatenate([scene.points, np.tile(position, (len(angle), 1))])
-    return replace(scene, points=points, normals=np.concatenate([scene.normals, turned]))
+    points = np.tile(position, (len(angle), 1))
+
+    def of_season(one: PhaseLight | PathLight) -> PhaseLight:
+        if not isinstance(one, PhaseLight):
+            raise ValueError("path tracing has no matrices: expected the light of a phase method")
+        own = replace(one.scene, points=points, normals=turned)
+        matrices = replace(one.matrices, scene=own, sensors=None, direct_sensors=None, view=None)
+        return phase_light(matrices, one.systems, one.sky, reflected=one.reflected)
+
+    whole: PhaseLight | SeasonalLight
+    if isinstance(light.light, SeasonalLight):
+        whole = replace(light.light, lights=tuple(map(of_season, light.light.lights)))
+    else:
+        whole = of_season(light.light)
+    return replace(light, scene=replace(scene, points=points, normals=turned), light=whole)
 
 
 def _optics(room: RoomInputs, inner: InnerGlass | None) -> list[Sequence[SystemOptics]]:

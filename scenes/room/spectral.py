@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -34,7 +34,7 @@ from mitsuba_cfs.spectra.detectors import (
 )
 from scenes.results import MELANOPIC_BY_DAY, DaylightResult, ExploredColour, SpectralYear
 from scenes.room.inputs import EYE_TURNS, RoomInputs
-from scenes.room.light import RoomLight
+from scenes.room.light import RoomLight, turned_eyes
 from scenes.room.luminaires import lamp_spectra
 from scenes.room.surface_spectra import room_reflectance
 from scenes.room.zone import lamp_lux
@@ -56,14 +56,21 @@ def room_spectral(
     Args: daylight: of the work plane, whose sensors are the first of the scene's.
     """
     channels, sensors = channels_of(room.options.outputs.channels), len(daylight.points)
+    eye = Detection(np.eye(channels.count), slice(-1, None))
     wanted = (
         Detection(channels.detection[[MELANOPIC]], slice(sensors)),
         Detection(channels.detection[[0]], slice(sensors), total=True),
-        Detection(np.eye(channels.count), slice(-1 - len(EYE_TURNS), None)),
+        eye,
     )
     spectral, notes = _light(room, light, state, channels, wanted, progress)
-    lamps, of_lamps = _lamps(room, light, channels, daylight)
-    return spectral_year(room, channels, spectral, [*notes, *of_lamps], lamps)
+    turned = turned_eyes(light)
+    others, _ = _light(room, turned, state, channels, (replace(eye, sensors=slice(-1)),), silent)
+    plane, photopic, own = spectral.received
+    bands = np.concatenate([others.received[0], own], axis=1)
+    lamps, of_lamps = _lamps(room, turned, channels, daylight)
+    return spectral_year(
+        room, channels, replace(spectral, received=(plane, photopic, bands)), [*notes, *of_lamps], lamps
+    )
 
 
 def eye_illuminances(
@@ -117,13 +124,14 @@ class LampYear:
 def _lamps(
     room: RoomInputs, light: RoomLight, channels: Channels, daylight: DaylightResult
 ) -> tuple[LampYear | None, list[str]]:
-    """The light of the lamps that have a spectrum, dimmed by daylight, and notes."""
+    """The light of the lamps that have a spectrum, dimmed by daylight, and notes; light: of the eyes."""
     tables = room.operation
     if tables is None or not tables.gains.lighting_w_m2:
         return None, []
     points, normals = light.scene.sensors()
-    some = np.r_[: len(daylight.points), len(points) - 1 - len(EYE_TURNS) : len(points)]
-    lamps = lamp_spectra(tables, room.space, points[some], normals[some], seed=room.options.sampling.seed)
+    upwards = np.tile([0.0, 0.0, 1.0], (len(daylight.points), 1))
+    places = np.concatenate([daylight.points, points]), np.concatenate([upwards, normals])
+    lamps = lamp_spectra(tables, room.space, *places, seed=room.options.sampling.seed)
     full = tables.gains.lighting_full_lx
     if lamps is None or not full:
         return None, [

@@ -14,6 +14,7 @@ from click.testing import CliRunner
 from bim.shoebox import shoebox
 from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.methods.light import eye_illuminance, illuminance
 from mitsuba_cfs.spectra.channels import channels_of
 from mitsuba_cfs.spectra.detectors import NANOMETRES, colour_temperature, daylight_efficacy_ratio, detected, illuminant
 from scenes.cli import cfs
@@ -23,7 +24,7 @@ from scenes.fenestration.thermal_file import SpectralTable, StateTable, read_spe
 from scenes.fenestration.tilts import tilt_states
 from scenes.input_files import read_weather
 from scenes.report.spectral_figures import melanopic_against_glare
-from scenes.room.light import room_light
+from scenes.room.light import room_light, turned_eyes
 from scenes.room.luminaires import lamp_spectrum, placed_spectrum
 from scenes.room.operation import read_operation, read_state
 from scenes.room.options import RoomOptions
@@ -69,8 +70,7 @@ def test_amber_light_is_hardly_melanopic(blind) -> None:
     systems = in_all_windows(space, read_system(blind))
     room = inputs_of_room(building, space, systems, read_weather(WEATHER), options)
     light, state = room_light(room), np.zeros((8760, 1), dtype=np.int64)
-    points = light.scene.points[:-3]
-    year = room_spectral(room, light, state, SimpleNamespace(points=points))
+    year = room_spectral(room, light, state, SimpleNamespace(points=light.scene.points))
     # D65 through the fabric; bands of 25 to 35 nm at its edge
     fabric = np.interp(NANOMETRES, [380, 500, 520, 780], [0.0, 0.0, 0.2, 0.2])
     expected = daylight_efficacy_ratio(illuminant("D65") * fabric)
@@ -270,3 +270,21 @@ def test_spectra_of_lamps(tmp_path) -> None:
     for name, message in (("none.csv", "no such file, nor an illuminant"), ("bad.spdx", "is no spectrum of IES TM-27")):
         with pytest.raises(DataError, match=message):
             placed_spectrum(name, tmp_path)
+
+
+def test_light_by_wavelength_does_not_change_the_photopic_light() -> None:
+    building = shoebox()
+    space = building.spaces[0]
+    systems, weather = in_all_windows(space, read_system(VENETIAN_BLIND)), read_weather(WEATHER)
+    both = [
+        room_light(inputs_of_room(building, space, systems, weather, RoomOptions.of(spectral=spectral, **FEW)))
+        for spectral in (False, True)
+    ]
+    plain, spectral = (illuminance(one.light) for one in both)
+    assert np.array_equal(plain, spectral)
+    turned = turned_eyes(both[1])
+    assert len(turned.scene.points) == 3
+    # to the back of the room, and to its sides, less light than towards the window
+    towards, around = eye_illuminance(turned.light).mean(), illuminance(turned.light).mean(axis=1)
+    assert towards > around.max() > 0
+    assert towards == pytest.approx(both[1].eye(np.zeros((8760, 1), dtype=np.int64)).mean(), rel=0.3)  # 64 paths

@@ -189,16 +189,17 @@ def radiances(window: Window, kind: str, bounces: int, divisions: int, room: str
         folder = Path(name)
         (folder / "room.rad").write_text(_surfaces(scene.interior, reflectance), "utf-8")
         (folder / "pane.cal").write_text(PANE_CAL, "utf-8")
-        (folder / "glass.rad").write_text(_glass(scene, window), "utf-8")
         azimuth = AZIMUTH - 180.0  # gendaylit's: west of south
         beam, diffuse = (0.0, 200.0) if kind == "overcast" else (800.0, 50.0)
         made = run(f"gendaylit -ang {ALTITUDE} {azimuth} -W {beam} {diffuse}", folder).decode()
         (folder / "sky.rad").write_text(_sky(made, kind, window.panes), "utf-8")
-        run("oconv sky.rad room.rad glass.rad > scene.oct", folder)
         lines = "".join(" ".join(f"{v:g}" for v in (*p, *n)) + "\n" for p, n in zip(POINTS, NORMALS, strict=True))
         options = f"-I+ -h -ab {bounces} -aa 0 -ad {divisions} -as 0 -lw 1e-7 -dj 0 -dc 1 -dt 0 -cs {BANDS} -co+"
         for low in np.linspace(380.0, 780.0, RANGES, endpoint=False):
-            command = f"rtrace {options} -cw {low:g} {low + 400 / RANGES:g} scene.oct"
+            high = low + 400.0 / RANGES
+            (folder / "glass.rad").write_text(_glass(scene, window, low, high), "utf-8")
+            run("oconv sky.rad room.rad glass.rad > scene.oct", folder)
+            command = f"rtrace {options} -cw {low:g} {high:g} scene.oct"
             text = run(command, folder, lines.encode()).decode()
             values = np.array([[float(v) for v in line.split()] for line in text.splitlines()])
             if values[0].size != BANDS:
@@ -280,8 +281,12 @@ coated(nm) = at((nm - 380)/5) * if(shape, shape, 0) / both(arg(3));
 """
 
 
-def _glass(scene: DaylightScene, window: Window) -> str:
-    """Panes as `glass`, a centimetre apart; what is innermost is in the window's plane."""
+def _glass(scene: DaylightScene, window: Window, low: float, high: float) -> str:
+    """Panes as `glass`, a centimetre apart; what is innermost is in the window's plane.
+
+    Radiance evaluates a `specfunc` at few wavelengths of its range, so that it has that of the run
+    [nm].
+    """
     parts, innermost = [], 0
     if window.fabric is not None:
         innermost = 1
@@ -300,7 +305,7 @@ def _glass(scene: DaylightScene, window: Window) -> str:
         values = " ".join(f"{v:.6g}" for v in (own, *shape, *table))
         function = "coated" if pane.coated else "pane"
         parts.append(
-            f"void specfunc tint{i}\n2 {function} pane.cal\n0\n{8 + len(every)} 380 780 {values}\n"
+            f"void specfunc tint{i}\n2 {function} pane.cal\n0\n{8 + len(every)} {low:g} {high:g} {values}\n"
             f"tint{i} glass layer{i}\n0\n0\n3 {own:.6g} {own:.6g} {own:.6g}\n"
         )
     for i in range(innermost + len(window.panes)):
