@@ -102,6 +102,12 @@ def test_glass_film_near_the_plane_wall():
     assert iso15099_inside(10.0, 20.0, 1.5, 101325.0) == pytest.approx(2.33, rel=0.02)
 
 
+def test_glass_film_is_weaker_in_thin_air():
+    """Laminar: Nu as the fourth root of Ra, which goes with the square of the density."""
+    sea, mountain = (iso15099_inside(15.0, 20.0, 1.5, pressure) for pressure in (101325.0, 81060.0))
+    assert mountain == pytest.approx(sea * 0.8**0.5, rel=1e-9)
+
+
 def test_room_light_is_conserved():
     rng = np.random.default_rng(5)
     area = rng.uniform(2, 20, 6)

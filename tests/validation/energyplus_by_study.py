@@ -252,11 +252,10 @@ IN_FACES = "Surface Inside Face Solar Radiation Heat Gain Rate"
 ON_FACADE = "FACADE:Surface Outside Face Incident Solar Radiation Rate per Area"
 IN_PANES = "WINDOW:Surface Window Total Glazing Layers Absorbed Shortwave Radiation Rate"
 THEIR_SUN = {f"{name}:{IN_FACES}": name for name in SUNLIT} | {ON_FACADE: "on facade", IN_PANES: "in panes"}
-TERM_STEPS = 30  # in an hour of EnergyPlus, whose sun is that of a step's end
 TERMS = (  # each in addition to those before
     "ours",
     "EnergyPlus' day of the sun",
-    "the sun of the hour held in EnergyPlus, in steps of two minutes",
+    "the sun of the hour held in EnergyPlus' steps",
     "one diffuse value of the window",
     "EnergyPlus' shares of the faces in the light indoors",
     "EnergyPlus' light indoors",
@@ -267,13 +266,9 @@ TERMS = (  # each in addition to those before
 def _term_rows(folder: Path, window: KnownWindow, epw: Path, facing: str, name: str) -> pd.DataFrame:
     """Air and window of a floating room beside EnergyPlus [K], and the sun in the room [kWh], by `TERMS`."""
     outputs = OUTPUTS | THEIR_SUN
-    held = with_held_sun(epw, folder / f"held {epw.name}", TERM_STEPS)
-    blended, steady = (
-        run_energyplus(
-            room_model(facing, *PATCHES.get(name, (name,)), outputs=outputs, steps=steps), weather, outputs=outputs
-        )
-        for weather, steps in ((epw, 6), (held, TERM_STEPS))
-    )
+    model = room_model(facing, *PATCHES.get(name, (name,)), outputs=outputs)
+    held = with_held_sun(epw, folder / f"held {epw.name}")
+    blended, steady = (run_energyplus(model, weather, outputs=outputs) for weather in (epw, held))
     text = study_text(epw, facing, window_text(window, name, "layers"), "")
     rooms = {}
     for sun, light in (("spa", "by direction"), ("energyplus", "by direction"), ("energyplus", "hemispherical")):
