@@ -11,7 +11,7 @@ import pytest
 from tests.conftest import WINDOW_GLAZING
 from tests.thermal.rooms import box, climate
 from thermal.balance import BalanceOptions, simulate
-from thermal.blackbox import Fenestration, as_surface, layer_absorptances, node_absorptances, with_realised_films
+from thermal.blackbox import Fenestration, layer_absorptances, node_absorptances, with_realised_films
 from thermal.climate import no_sun
 from thermal.closure import Closure
 from thermal.emitters import IdealLoads
@@ -125,18 +125,6 @@ def test_g_counts_what_each_layer_sends_inwards():
     assert g[2] == pytest.approx(0.5 * (g[0] + g[1]), abs=2e-3)  # nearly linear
     fractions = (g[:2] - 0.5) / 0.2
     assert fractions[0] < 0.15 and fractions[1] > 0.7
-
-
-@pytest.mark.parametrize("shift", [0.0, 0.1])
-@pytest.mark.parametrize("apart", [(-5.0, 20.0), (5.0, 20.0), (20.0, 45.0), (35.0, 60.0), (27.0, 33.0)])
-def test_resistance_of_panes_is_that_of_their_balance(apart, shift):
-    """Where the gas begins to turn in the gap six coefficients were up to 3 % off: 0.2 K of a sunny room."""
-    u_value = iso15099_data(DOUBLE).u_value
-    data = iso15099_data(DOUBLE, 1.0 / (1.0 / u_value + shift))
-    balance = unit_balance(DOUBLE, prescribed(*apart))
-    outer, inner = balance.faces_c[0], balance.faces_c[-1]
-    exact = (inner - outer) / -balance.heat_in + shift
-    assert data.resistance.at(0.5 * (inner + outer), outer - inner) == pytest.approx(exact, rel=2e-3)
 
 
 def test_blackbox_of_the_layers_gives_their_u_and_films():
@@ -380,4 +368,4 @@ def test_reference_glazing_comes_out_of_its_layers():
     stored_c = c[0] + c[1] * x + c[2] * difference + c[3] * difference**2
     stored_c = stored_c + c[4] * x * difference + c[5] * x**2
     # two fits of 1.3 % rms each to nearly the same points
-    np.testing.assert_allclose(as_surface(data.resistance).at(mean, difference), 1 / stored_c, rtol=0.02)
+    np.testing.assert_allclose(data.resistance.at(mean, difference), 1 / stored_c, rtol=0.02)
