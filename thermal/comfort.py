@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from importlib import import_module
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -194,8 +200,7 @@ def pmv_ppd(
     humidity: relative [%]; metabolic_rate in met, clothing in clo.  Hours outside the standard's
     limits are computed all the same.
     """
-    from pythermalcomfort.models import pmv_ppd_iso
-
+    pmv_ppd_iso = _model("pmv_ppd_iso")
     air, mrt, speed, moist = _surroundings(air_c, mrt_c, air_speed, humidity)
     result = pmv_ppd_iso(tdb=air, tr=mrt, vr=speed, rh=moist, met=metabolic_rate, clo=clothing, **_PLAIN)
     return np.asarray(result.pmv, dtype=float), np.asarray(result.ppd, dtype=float)
@@ -211,11 +216,30 @@ def standard_effective_temperature(
     clothing: float = 0.5,
 ) -> NDArray[np.float64]:
     """SET [H] [degC] (Gagge two-node model, pythermalcomfort); arguments as for `pmv_ppd`."""
-    from pythermalcomfort.models import set_tmp
-
+    set_tmp = _model("set_tmp")
     air, mrt, speed, moist = _surroundings(air_c, mrt_c, air_speed, humidity)
     result = set_tmp(tdb=air, tr=mrt, v=speed, rh=moist, met=metabolic_rate, clo=clothing, **_PLAIN)
     return np.asarray(result.set, dtype=float)
+
+
+_PACKAGE = "pythermalcomfort.models"
+
+
+@cache
+def _model(name: str) -> Callable[..., Any]:
+    """One model of pythermalcomfort: importing all of them compiles what is not used here, for a second."""
+    import pythermalcomfort
+
+    stand_in = _PACKAGE not in sys.modules  # for the package; a later import of it runs the package itself
+    if stand_in:
+        package = sys.modules[_PACKAGE] = ModuleType(_PACKAGE)
+        package.__path__ = [f"{folder}/models" for folder in pythermalcomfort.__path__]
+    try:
+        model: Callable[..., Any] = getattr(import_module(f"{_PACKAGE}.{name}"), name)
+    finally:
+        if stand_in:
+            del sys.modules[_PACKAGE]
+    return model
 
 
 _PLAIN = {"limit_inputs": False, "round_output": False}

@@ -10,12 +10,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky import sun as sun_module
@@ -23,6 +23,9 @@ from mitsuba_cfs.sky.options import GROUNDS, PARTS, SUN_PATCHES
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.perez import PerezSky, perez_sky, relative_luminance
 from mitsuba_cfs.sky.weather import Weather
+
+if TYPE_CHECKING:
+    from scipy.spatial import cKDTree
 
 OVERCAST = 0.777778  # horizontal illuminance over pi times the zenith luminance, CIE overcast sky
 CLEAR_FROM = 6.0  # clearness
@@ -294,6 +297,8 @@ def series_matrix(
 @cache
 def _patch_tree(subdivision: int) -> cKDTree:
     """The patches above the horizon by their directions, for their neighbours."""
+    from scipy.spatial import cKDTree  # 0.2 s, where skies are computed
+
     return cKDTree(ReinhartSky(subdivision).directions[1:])
 
 

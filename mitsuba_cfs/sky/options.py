@@ -6,7 +6,7 @@ A module of its own, so that a command's options are known before anything heavy
 from __future__ import annotations
 
 SUBDIVISIONS = (1, 2, 4, 6)  # Reinhart's MF of the sky's patches
-SUN_MODELS = ("spa", "radiance")
+SUN_MODELS = ("spa", "radiance", "energyplus")
 GROUNDS = ("reflected", "gendaylit")  # see `mitsuba_cfs.sky.matrix`
 LEAST_ALTITUDE_DEG = 3.0  # below it, global minus diffuse says nothing about the direct beam
 PARTS = ("all", "sky", "sun")

@@ -264,7 +264,7 @@ sun_option = click.option(
     type=click.Choice(SUN_MODELS),
     default=SUN_MODELS[0],
     show_default=True,
-    help="Sun position by NREL's SPA, or by Radiance's formula (gendaymtx).",
+    help="Sun position by NREL's SPA, by Radiance's formula (gendaymtx), or by EnergyPlus'.",
 )
 sky_ground_option = click.option(
     "--sky-ground",

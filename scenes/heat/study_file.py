@@ -13,6 +13,7 @@ from bim.model import BOX_PARTS
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.gloss import ROUGHEST
 from mitsuba_cfs.methods import METHODS
+from mitsuba_cfs.sky.options import SUN_MODELS
 from scenes import plausible
 from scenes.fenestration.thermal_file import StateTable
 from scenes.heat.measured_weather import MeasuredTable
@@ -95,6 +96,7 @@ class TraceTable(TomlTable):
     seed: int = RUN.sampling.seed
     view_factors: bool = True  # of the room's surfaces, for longwave and the person
     sky_light: Literal[SKY_LIGHTS] = RUN.sky_light  # see `RoomOptions`
+    sun_model: Literal[SUN_MODELS] = RUN.sun_model  # of the sun's position, see `mitsuba_cfs.sky.sun`
 
 
 class TransferTable(TomlTable):

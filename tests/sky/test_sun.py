@@ -50,6 +50,22 @@ def test_the_sun_goes_where_it_should(model):
     assert south[1] > 0  # noon sun in the north
 
 
+def test_energyplus_day_of_the_sun_is_late():
+    """EnergyPlus 25.2's own output for Phoenix, mean of the six steps of the hour that ends at 13 h."""
+    theirs = {"2017-01-15": 35.13, "2017-03-21": 56.27, "2017-06-15": 79.08, "2017-09-23": 56.35, "2017-11-15": 37.82}
+    apart = {}
+    for day, printed in theirs.items():
+        steps = pd.date_range(f"{day} 12:10", periods=6, freq="10min")
+        weather = weather_at(steps, 33.45, -111.98, -7.0, 337.0)
+        mean = {m: np.degrees(sun.altitude(sun.sun_directions(weather, model=m))).mean() for m in ("spa", "energyplus")}
+        assert mean["energyplus"] == pytest.approx(printed, abs=0.01)
+        apart[day] = mean["energyplus"] - mean["spa"]
+    # a day and a half late: 0.6 degrees at the equinoxes, almost none at the solstice
+    assert apart["2017-03-21"] == pytest.approx(-0.59, abs=0.03)
+    assert apart["2017-09-23"] == pytest.approx(0.58, abs=0.03)
+    assert abs(apart["2017-06-15"]) < 0.08
+
+
 def test_longitude_and_time_zone():
     """15 degrees further east, one hour earlier by the zone's clock."""
     first = weather_at(["2017-03-05 09:00"], 30.0, 15.0, 1.0)

@@ -29,11 +29,12 @@ from mitsuba_cfs.bsdf.glazing import HEMISPHERE, Pane, hemispherical_mean, pane_
 from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.progress import silent
 from scenes.fenestration.thermal_system import sun_in_layers
-from scenes.heat.study import run_study
+from scenes.heat.study import BalancedRooms, run_study
 from scenes.heat.study_file import read_study
+from scenes.room.zone import RoomZone, balances
 from tests.validation.ashrae140_sun import ANGLES, PANE
 from tests.validation.differences import rmse_and_bias
-from tests.validation.energyplus_program import room_model, run_energyplus, with_held_sun
+from tests.validation.energyplus_program import OUTPUTS, room_model, run_energyplus, with_held_sun
 from tests.validation.energyplus_reference import load_hours
 from tests.validation.energyplus_study import COLUMNS, FIRST_HOUR, GLAZING, STUDY
 from tests.validation.energyplus_traced import traced_system
@@ -173,15 +174,21 @@ def main(
     inputs: Annotated[Sequence[str], INPUTS] = INPUTS,
     energyplus_steps: int = 6,
     held_sun: bool = False,
+    terms: bool = False,
 ) -> dict[str, pd.DataFrame]:
     """Every case, and the root mean squares by system and inputs.
 
     Args:
         energyplus_steps: of EnergyPlus' floating rooms in an hour.
         held_sun: EnergyPlus has each hour's sun in all steps of that hour, as the file states it.
+        terms: instead, our floating rooms by layers with one term of the sun after the other as
+            EnergyPlus has it: for glazing.
     """
     folder.mkdir(parents=True, exist_ok=True)
     known = {name: known_window(folder, reference, name) for name in systems}
+    if terms:
+        cases = [(epw, facing, name) for epw in climates for facing in orientations for name in systems]
+        return {"Terms": pd.concat([_term_rows(folder, known[case[2]], *case) for case in cases])}
     rows = []
     for epw in climates:
         told = with_held_sun(epw, folder / f"held {epw.name}") if held_sun else epw
@@ -231,6 +238,94 @@ def _loads(hours: pd.DataFrame, theirs: pd.DataFrame) -> dict[str, float]:
         row[f"{what} E+"] = float(theirs[other].sum())
     row["peak"], row["peak E+"] = float(hours["cooling_w"].max()), 1e3 * float(theirs[other].max())
     return row
+
+
+SUNLIT = {  # EnergyPlus' name of a face: its outward direction; x to the left of who looks out, y outdoors
+    "FACADE": (0, 1, 0),
+    "BACK": (0, -1, 0),
+    "X4": (1, 0, 0),
+    "X0": (-1, 0, 0),
+    "FLOOR": (0, 0, -1),
+    "CEILING": (0, 0, 1),
+}
+IN_FACES = "Surface Inside Face Solar Radiation Heat Gain Rate"
+ON_FACADE = "FACADE:Surface Outside Face Incident Solar Radiation Rate per Area"
+IN_PANES = "WINDOW:Surface Window Total Glazing Layers Absorbed Shortwave Radiation Rate"
+THEIR_SUN = {f"{name}:{IN_FACES}": name for name in SUNLIT} | {ON_FACADE: "on facade", IN_PANES: "in panes"}
+TERMS = (  # each in addition to those before
+    "ours",
+    "EnergyPlus' day of the sun",
+    "the sun of the hour held in EnergyPlus' steps",
+    "one diffuse value of the window",
+    "EnergyPlus' shares of the faces in the light indoors",
+    "EnergyPlus' light indoors",
+    "EnergyPlus' sun in the panes and on the facade",
+)
+
+
+def _term_rows(folder: Path, window: KnownWindow, epw: Path, facing: str, name: str) -> pd.DataFrame:
+    """Air and window of a floating room beside EnergyPlus [K], and the sun in the room [kWh], by `TERMS`."""
+    outputs = OUTPUTS | THEIR_SUN
+    model = room_model(facing, *PATCHES.get(name, (name,)), outputs=outputs)
+    held = with_held_sun(epw, folder / f"held {epw.name}")
+    blended, steady = (run_energyplus(model, weather, outputs=outputs) for weather in (epw, held))
+    text = study_text(epw, facing, window_text(window, name, "layers"), "")
+    rooms = {}
+    for sun, light in (("spa", "by direction"), ("energyplus", "by direction"), ("energyplus", "hemispherical")):
+        study = folder / f"{epw.stem} {facing} {name} {sun} {light}.toml"
+        options = f'[trace]\nsun_model = "{sun}"\nsky_light = "{light}"\n'
+        study.write_text(text.replace("[trace]\n", options), "utf-8")
+        found: list[BalancedRooms] = []
+        run_study(read_study(study), silent, balanced=found.append)
+        rooms[sun, light] = found[0]
+    plain, theirs, last = rooms.values()
+    (room,) = last.rooms
+    inside = np.stack([steady[name].to_numpy() for name in _faces(room)], axis=1)
+    through = steady["Q_trans"].to_numpy()[:, None]
+    shares = np.where(through > 1.0, inside / np.maximum(through, 1.0), 0.0)
+    shared, lit = (_with_light(room, one) for one in (shares * room.gains["transmitted_w"][:, None], inside))
+    years = [one.results[0] for one in (plain, theirs, theirs, last)]
+    everywhere = _with_panes(lit, steady)
+    years += [balances([one], last.weather, 600.0, terrain="suburbs")[0] for one in (shared, lit, everywhere)]
+    suns = [one.rooms[0] for one in (plain, theirs, theirs, last)] + [shared, lit, everywhere]
+    judges = [blended, blended, *[steady] * 5]
+    rows = []
+    for term, year, sunlit, judge in zip(TERMS, years, suns, judges, strict=True):
+        row = {"climate": epw.stem, "facing": facing, "system": name, "term": term}
+        apart = {"air": (year.air_c, "T_air"), "window": (year.window_inner_c[:, 0], "T_win_in")}
+        for what, (values, column) in apart.items():
+            row[what], row[f"{what} bias"] = rmse_and_bias(values[FIRST_HOUR:], judge[column].to_numpy()[FIRST_HOUR:])
+        row["light"] = float(sunlit.solar.inside.sum()) / 1e3
+        row["light E+"] = float(judge[list(SUNLIT)].to_numpy().sum()) / 1e3
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def _faces(room: RoomZone) -> list[str]:
+    """EnergyPlus' names of a room's faces, by their places around its window."""
+    (window,) = room.zone.windows
+    out = window.normal
+    axes = np.stack([np.cross([0.0, 0.0, 1.0], out), out, [0.0, 0.0, 1.0]])
+    turned = [tuple(np.round(axes @ face.normal).astype(int).tolist()) for face in room.zone.surfaces]
+    return [next(name for name, normal in SUNLIT.items() if normal == one) for one in turned]
+
+
+def _with_light(room: RoomZone, inside: np.ndarray) -> RoomZone:
+    """The room with other light in its faces [H, F] [W]."""
+    return replace(room, solar=replace(room.solar, inside=inside))
+
+
+def _with_panes(room: RoomZone, theirs: pd.DataFrame) -> RoomZone:
+    """The room with EnergyPlus' sun in the panes, in our shares of the two, and on the facade."""
+    (window,), sun = room.zone.windows, room.solar
+    facade = sun.facade.copy()
+    facade[:, _faces(room).index("FACADE")] = theirs["on facade"].to_numpy()
+    own = np.zeros_like(sun.absorbed_inner) if sun.window_inside is None else np.asarray(sun.window_inside)
+    outer, inner = sun.absorbed_outer, sun.absorbed_inner + own
+    both = theirs["in panes"].to_numpy()[:, None] / window.area
+    share = np.where(outer + inner > 1.0, outer / np.maximum(outer + inner, 1.0), 0.5)
+    panes = {"absorbed_outer": share * both, "absorbed_inner": (1.0 - share) * both, "window_inside": None}
+    return replace(room, solar=replace(sun, facade=facade, **panes))
 
 
 def _by_system(table: pd.DataFrame) -> pd.DataFrame:
