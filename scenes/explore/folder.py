@@ -69,10 +69,12 @@ def write_explorer(result: RunResult, folder: Path, page: PageOptions = OWN_PAGE
 def write_rooms(result: RunResult, folder: Path) -> None:
     """Write what the explorer of a run shows, without the page."""
     (folder / "data").mkdir(parents=True, exist_ok=True)
-    entries: dict[str, dict[str, Any]] = {}
+    entries: list[dict[str, Any]] = []
+    by_label: dict[str, dict[str, Any]] = {}
     for number, room in enumerate(one for one in result.spaces if one.explored is not None):
-        shared = entries.get(room.template or "")
-        entries[room.space.label] = write_room(folder, f"room{number}", result, room, shared=shared)
+        shared = by_label.get(room.template or "")
+        entries.append(write_room(folder, f"room{number}", result, room, shared=shared))
+        by_label.setdefault(room.space.label, entries[-1])
     first = result.times[0]
     colours = ColourScale(0, 1, "", "").rgba((np.arange(STEPS) + 0.5) / STEPS)[:, :3]
     write_data(
@@ -84,7 +86,7 @@ def write_rooms(result: RunResult, folder: Path) -> None:
             "hours": len(result.times),
             "head": head_lines(result.head, result.notes),
             "palette": base64.b64encode(colours.tobytes()).decode("ascii"),
-            "rooms": list(entries.values()),
+            "rooms": entries,
         },
     )
 
