@@ -22,6 +22,8 @@ from scenes.run.options import JobOptions
 from tests.explore.synthetic import explored_run
 from tests.scenes.small_box import BOX, ROOM, SMALL
 
+SHIFT = np.array([10.0, 0.0, 3.0])
+
 
 def moved(building: Building, offset: tuple[float, float, float], name: str):
     """The building's room somewhere else, under another name."""
@@ -67,7 +69,8 @@ def test_an_equal_room_is_offered_by_its_name_in_the_explorer(tmp_path) -> None:
     one = run.spaces[0]
     twin = replace(
         one.space,
-        faces=tuple(replace(f, triangles=f.triangles + [10.0, 0.0, 3.0]) for f in one.space.faces),
+        faces=tuple(replace(f, triangles=f.triangles + SHIFT) for f in one.space.faces),
+        windows=tuple(replace(w, triangles=w.triangles + SHIFT) for w in one.space.windows),
         guid="twin-guid",
         name="twin",
     )
@@ -90,7 +93,7 @@ def test_rooms_whose_people_draw_lots_are_not_interchangeable(weather, glass, tm
         path.write_text(f'[control]\nrule = "manual"\nbehaviour = "{behaviour}"\n')
         systems = in_all_windows(ROOM, glass) | in_all_windows(twin, glass)
         inputs = run.Inputs(building, [ROOM, twin], weather, systems, read_operation(path))
-        found.append(run._interchangeable(inputs, JobOptions(), ROOM, twin))
+        found.append(run._interchangeable(inputs, JobOptions(Path(), Path()), ROOM, twin))
     assert found == [True, False]
 
 
