@@ -66,7 +66,7 @@ def haldi_robinson_2010(
     *,
     blinds: int,
     substeps: int = SUBSTEPS,
-    seed: int = 0,
+    seed: int | tuple[int, ...] = 0,
 ) -> FloatArray:
     """Mean unshaded share of each blind of a room in every hour [H, N].
 

@@ -76,9 +76,9 @@ def _photometry(one: Entity, values: dict[str, Any]) -> str:
     for items in (_items(part) for part in (one, _type(one)) if part is not None):
         for item in items:
             if item.is_a("IfcLightSourceGoniometric"):
-                for source in entities(item.LightDistributionDataSource):
-                    if source.is_a("IfcExternalReference") and source.Location:
-                        return str(source.Location)
+                location = getattr(item.LightDistributionDataSource, "Location", None)
+                if location:  # of an external file; else a table of intensities, which is not read
+                    return str(location)
     named = (v for v in values.values() if isinstance(v, str) and v.strip().lower().endswith(FILES))
     return next(named, "").strip()
 

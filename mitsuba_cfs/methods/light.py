@@ -335,8 +335,12 @@ def with_pictures(
         count = len(light.lights)
         for i, one in enumerate(map(_by_phases, light.lights)):
             steps = part(progress, i / count, (i + 1) / count)
-            lights.append(with_pictures(one, direct=direct, by_states=by_states, progress=steps))
+            lights.append(_with_pictures(one, direct, by_states, steps))
         return replace(light, lights=tuple(lights))
+    return _with_pictures(light, direct, by_states, progress)
+
+
+def _with_pictures(light: PhaseLight, direct: bool, by_states: bool, progress: Progress) -> PhaseLight:
     shown = with_phase_pictures(light, direct=direct, progress=progress)
     return replace(shown, views={}) if by_states else shown
 

@@ -72,11 +72,9 @@ def _of_model(gains: GainsTable, building: Building, space: Space) -> GainsTable
 
     Raises: `DataError` for a room without luminaires, or one that states neither photometry nor power.
     """
-    places = [one.position for one in building.luminaires]
-    inside = in_room(space, np.array(places)) if places else []
-    chosen = [one for one, there in zip(building.luminaires, inside, strict=True) if there]
+    chosen = [one for one in building.luminaires if in_room(space, np.array([one.position]))[0]]
     if not chosen:
-        message = f"the model has {len(places)} luminaires, none in this room"
+        message = f"the model has {len(building.luminaires)} luminaires, none in this room"
         raise DataError(message, file=building.file, element=space.label, field="gains.luminaires")
     folder = Path() if building.file is None else building.file.parent
     watts = [gains.luminaire_w if one.watts is None else one.watts for one in chosen]
@@ -89,10 +87,11 @@ def _of_model(gains: GainsTable, building: Building, space: Space) -> GainsTable
             message = f"luminaire {one.name} names {one.photometry}: no such file beside the model"
             raise DataError(message, file=building.file, element=space.label, field="gains.luminaires")
     if None in files:
-        if None in watts:
+        powers = [power for power in watts if power is not None]
+        if len(powers) < len(watts):
             message = "some luminaires state photometry alone, others power alone: state `luminaire_w`"
             raise DataError(message, file=building.file, element=space.label, field="gains.luminaire_w")
-        return gains.model_copy(update={"lighting_w_m2": sum(watts) / space.floor_area, "luminaires": ""})
+        return gains.model_copy(update={"lighting_w_m2": sum(powers) / space.floor_area, "luminaires": ""})
     tables = [
         LuminaireTable(
             file=file, position=one.position, turned_deg=one.turned_deg, watts=one.watts or gains.luminaire_w

@@ -584,7 +584,7 @@ def _by_habit(
         level,
         _present(room),
         blinds=len(members),
-        seed=[rule.seed, zlib.crc32(room.space.guid.encode())],  # other people in each room
+        seed=(rule.seed, zlib.crc32(room.space.guid.encode())),  # other people in each room
         substeps=max(round(12 * room.weather.step_h), 1),
     )
     return {c: np.rint((1.0 - shares[:, n]) * (counts[n] - 1)).astype(np.int64) for n, c in enumerate(members)}
