@@ -61,28 +61,35 @@ class LampLight:
 
 
 def lamp_light(
-    space: Space, luminaires: Sequence[Luminaire], points: FloatArray, *, paths: int = PATHS, seed: int = 0
+    space: Space,
+    luminaires: Sequence[Luminaire],
+    points: FloatArray,
+    normals: FloatArray | None = None,
+    *,
+    paths: int = PATHS,
+    seed: int = 0,
 ) -> LampLight:
-    """Light of luminaires on level sensors of a room.
+    """Light of luminaires on sensors of a room, level ones by default.
 
     Reflections are followed backwards from the sensors, cosine by cosine, and lit at every surface
     by all luminaires.  Glass is black; surfaces are diffuse; the housing hides nothing.
 
-    Args: points: [S, 3] [m].
+    Args: points: [S, 3] [m]; normals: [S, 3].
     """
     surfaces = furnished_surfaces(space, "visible")
     triangles = np.asarray(surfaces.triangles, dtype=float)
     reflectance = np.asarray(surfaces.reflectance, dtype=float)
     edges = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     faces = edges / np.maximum(np.linalg.norm(edges, axis=1), 1e-12)[:, None]
-    mesh, up = ray_mesh(triangles), np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    mesh = ray_mesh(triangles)
+    towards = np.tile([0.0, 0.0, 1.0], (len(points), 1)) if normals is None else normals
 
     def lit(at: FloatArray, normals: FloatArray) -> FloatArray:
         parts = (one.illuminance(at, normals, mesh) for one in luminaires)
         return np.sum([*parts, np.zeros(len(at))], axis=0)
 
     random = np.random.default_rng(seed)
-    at, normal = np.repeat(points, paths, axis=0), np.repeat(up, paths, axis=0)
+    at, normal = np.repeat(points, paths, axis=0), np.repeat(towards, paths, axis=0)
     weight, own = np.ones(len(at)), np.arange(len(at))
     gathered = np.zeros(len(at))
     for _ in range(BOUNCES):
@@ -99,7 +106,7 @@ def lamp_light(
             break
     by_sensor = gathered.reshape(len(points), paths)
     error = float(by_sensor.mean(axis=0).std(ddof=1) / np.sqrt(paths)) if paths > 1 else np.inf
-    return LampLight(lit(points, up), by_sensor.mean(axis=1), error)
+    return LampLight(lit(points, towards), by_sensor.mean(axis=1), error)
 
 
 def _cosine(normals: FloatArray, random: np.random.Generator) -> FloatArray:

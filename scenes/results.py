@@ -264,6 +264,22 @@ class OperationResult:
 
 
 @dataclass(frozen=True, slots=True)
+class ExploredColour:
+    """Colours of a room's pictures, part by part, and its melanopic light.
+
+    A tint is linear sRGB over luminance, then the melanopic DER [4]; colours are balanced: grey
+    under the hour's daylight on a horizontal plane outdoors is (1, 1, 1). DER is not.
+    """
+
+    pixels: tuple[NDArray[np.float32], ...]  # [J][n, 4] tint of what each pixel shows, under white light
+    indoors: NDArray[np.float32]  # [J, L, 4] of the light at the eye, for what the room reflects
+    sky: NDArray[np.float32]  # [L, 4] of the sky, for what is seen through windows
+    sun: NDArray[np.float32]  # [J, L, 4] of the sun's beam indoors
+    melanopic: tuple[NDArray[np.float32], ...]  # [J] melanopic EDI of the sensors [S, L] [lx]
+    eye: NDArray[np.float32]  # [J, L] melanopic EDI of the eye [lx]
+
+
+@dataclass(frozen=True, slots=True)
 class ExploredRoom:
     """A room in every lit hour and every combination of shading states, for the explorer.
 
@@ -280,6 +296,7 @@ class ExploredRoom:
     through: NDArray[np.float32]  # [J, G, L] transmittance of each window group's straight beam
     sun_illuminance: NDArray[np.float32]  # [L] normal to the beam [lx]
     windows: tuple[NDArray[np.float64], ...]  # [G] triangles [T, 3, 3] of each group [m]
+    colour: ExploredColour | None = None  # of runs by wavelength
 
 
 @dataclass(frozen=True, slots=True, repr=False)

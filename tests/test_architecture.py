@@ -45,6 +45,7 @@ SOLVERS = tuple(
         "point_in_time",
         "reflected_sun",
         "standard_error",
+        "coloured_room",
         "spectral_light",
         "sun_by_patches",
         "view_cache",

@@ -15,7 +15,7 @@ from tests.conftest import REPOSITORY
 
 pytestmark = pytest.mark.early
 
-PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").glob("*.md"))]
+PAGES = [REPOSITORY / "README.md", *sorted((REPOSITORY / "docs").rglob("*.md"))]
 FENCE = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 FILES = {  # the names that the pages use
     "blind.xml": VENETIAN_BLIND,

@@ -15,6 +15,7 @@ NO_EVIDENCE = {
     "capabilities.md": "all",
     "formats.md": "all",
     "glossary.md": "all",
+    "howto.md": "all",
     "issues.md": "all",
     "quickstart.md": "all",
     "validation.md": {"| subject | judged by | page |"},

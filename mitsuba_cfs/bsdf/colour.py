@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree
+from mitsuba_cfs.spectra.detectors import NANOMETRES, illuminant, sensitivities
 
 COLOUR_BANDS = ("CIE-X", "CIE-Z")
 # linear sRGB from CIE XYZ (IEC 61966-2-1, as Mitsuba's `xyz_to_srgb`); its white is D65
@@ -72,3 +73,24 @@ def primary_spectra() -> NDArray[np.float64]:
     wanted = np.concatenate([np.zeros(len(rough)), weight * np.eye(3).ravel(), np.full(n, weight)])
     spectra = lsq_linear(system, wanted, bounds=(0, 1)).x.reshape(3, n)
     return spectra / spectra.sum(axis=0)
+
+
+def reflectance_of_colour(linear: ArrayLike) -> NDArray[np.float64]:
+    """Smooth reflectance [.., N] at `NANOMETRES` of linear sRGB under D65 [.., 3], 0 to 1 each."""
+    primaries = [np.interp(NANOMETRES, WAVELENGTHS_NM, row) for row in primary_spectra()]
+    return np.clip(np.asarray(linear, dtype=float), 0.0, 1.0) @ np.array(primaries)
+
+
+def with_visible(spectrum: ArrayLike, visible: ArrayLike) -> NDArray[np.float64]:
+    """Reflectance [.., N] of the shape of a spectrum whose mean for D65 and V(lambda) is given [..].
+
+    Where that would reflect more than all light at some wavelength, the colour is paler.
+    """
+    spectrum, visible = np.asarray(spectrum, dtype=float), np.asarray(visible, dtype=float)[..., None]
+    weight = illuminant("D65") * sensitivities()[0]
+    mean = (spectrum @ weight / weight.sum())[..., None]
+    scaled = spectrum * np.divide(visible, mean, out=np.ones_like(mean), where=mean > 0)
+    most = scaled.max(axis=-1, keepdims=True)
+    share = np.where(most > 1.0, (1.0 - visible) / np.maximum(most - visible, 1e-12), 1.0)
+    whole: NDArray[np.float64] = visible + share * (scaled - visible)
+    return whole

@@ -17,6 +17,7 @@ from mitsuba_cfs.spectra.detectors import NANOMETRES, illuminant, sensitivities
 
 Array = NDArray[np.float64]
 ANGLES = np.radians(np.arange(0.0, 89.1, 1.0))  # up to grazing incidence, where nothing passes
+VISIBLE = illuminant("D65") * sensitivities()[0]  # weights of visible light [N]
 PATCH_ANGLES = 32  # angles of incidence in each patch, for its mean
 
 
@@ -29,6 +30,7 @@ class SpectralFactor:
 
     transmittance: Array  # [A, N] at `ANGLES` and `NANOMETRES`, of any scale
     whole: bool = True  # of all its layers; otherwise the rest passes all wavelengths equally
+    mirrored: Array | None = None  # [N] reflectance of its room side for diffuse light; None: neutral
 
     @staticmethod
     def of_panes(panes: Sequence[SpectralPane], shade: ArrayLike = 1.0, reflectance: ArrayLike = 0.0) -> SpectralFactor:
@@ -40,9 +42,14 @@ class SpectralFactor:
                 goes to and fro between it and the panes.
         """
         tau = spectral_transmittance(panes, NANOMETRES, ANGLES) if panes else np.ones((1, 1))
-        back = diffuse_reflectance(panes, NANOMETRES) if panes else 0.0
-        whole = tau * np.asarray(shade, dtype=float) / (1 - np.asarray(reflectance) * back)
-        return SpectralFactor(np.broadcast_to(whole, (len(ANGLES), len(NANOMETRES))))
+        back = diffuse_reflectance(panes, NANOMETRES) if panes else np.zeros(len(NANOMETRES))
+        passed, sent = (np.asarray(values, dtype=float) for values in (shade, reflectance))
+        to_and_fro = 1 / (1 - sent * back)
+        mirrored = None
+        if np.all(passed == 1.0) or np.any(sent > 0):  # else the shade's scale is not known
+            mirrored = np.broadcast_to(sent + passed**2 * back * to_and_fro, (len(NANOMETRES),))
+        whole = np.broadcast_to(tau * passed * to_and_fro, (len(ANGLES), len(NANOMETRES)))
+        return SpectralFactor(whole, mirrored=mirrored if panes or np.any(sent > 0) else None)
 
     @staticmethod
     def neutral() -> SpectralFactor:
@@ -52,8 +59,7 @@ class SpectralFactor:
     @cached_property
     def visible(self) -> Array:
         """Transmittance [A] for D65 and V(lambda)."""
-        weight = illuminant("D65") * sensitivities()[0]
-        visible: Array = self.transmittance @ weight / weight.sum()
+        visible: Array = self.transmittance @ VISIBLE / VISIBLE.sum()
         return visible
 
     def of_angles(self, channels: Channels) -> Array:

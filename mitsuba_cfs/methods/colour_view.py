@@ -69,16 +69,16 @@ def daylight_rgb(temperature: ArrayLike) -> NDArray[np.float64]:
     from colour.temperature import CCT_to_xy_CIE_D  # a second, which only colour takes
 
     x, y = np.moveaxis(np.asarray(CCT_to_xy_CIE_D(np.asarray(temperature))), -1, 0)
-    return _rgb(x / y, (1 - x - y) / y)
+    return rgb_over_luminance(x / y, (1 - x - y) / y)
 
 
 def sun_colour(height: float) -> NDArray[np.float64]:
     """Linear sRGB over luminance [3] of the sun's beam, by the sine of its altitude."""
     x, y, z = detected(sun_spectra(height))[0, -3:]
-    return _rgb(x / y, z / y)
+    return rgb_over_luminance(x / y, z / y)
 
 
-def _rgb(x: ArrayLike, z: ArrayLike) -> NDArray[np.float64]:
+def rgb_over_luminance(x: ArrayLike, z: ArrayLike) -> NDArray[np.float64]:
     """Linear sRGB over luminance of X / Y and Z / Y."""
     x, z = np.asarray(x) / WHITE[0], np.asarray(z) / WHITE[2]
     return relative_rgb(x, np.ones_like(x), z)

@@ -488,7 +488,7 @@ def _sensor_light(
     added = in_room = None
     noise: list[SunNoise] = []
     if light.reflected is None:
-        added = in_room = _beam_in_room(light, one, g) if _passes_beam(one) else None
+        added = in_room = beam_by_patches(light, one, g) if _passes_beam(one) else None
     elif reflected is not None:
         (added, in_room, traced), shining = reflected, light.reflected.shining
         noise.append(SunNoise(traced, np.ones(len(shining)), shining))
@@ -500,7 +500,7 @@ def _sensor_light(
     return SensorLight(one, added, sun, tuple(noise), in_room)
 
 
-def _beam_in_room(light: PhaseLight, one: GroupCoefficients, g: int) -> Array:
+def beam_by_patches(light: PhaseLight, one: GroupCoefficients, g: int) -> Array:
     """The sun's beam that a room with mirrors reflects, at the sun's own angle [S, L] [lx]."""
     view, direct_view = sensor_matrix(light.matrices), direct_sensor_matrix(light.matrices)
     indirect, total = view.values - direct_view, np.zeros((len(direct_view), len(light.sky.lit)))

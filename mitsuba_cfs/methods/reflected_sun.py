@@ -124,6 +124,29 @@ def reflected_to_sensors(
     ]
 
 
+def beams_in_rooms(
+    matrices: PhaseMatrices, sun: ReflectedSun, rooms: Sequence[SunlitRoom | None], group: GroupCoefficients, g: int
+) -> list[NDArray[np.float64]]:
+    """The sun's beam through a group that rooms of one shape reflect to the sensors [n][S, L] [lx].
+
+    Args: rooms: None where the surfaces reflect nothing.
+    """
+    some, S = [room for room in rooms if room is not None], len(matrices.scene.sensors()[0])
+    found = iter(np.zeros((len(some), S, len(sun.shining))))
+    if some:
+        stacked = [np.concatenate([room.shares[b] for room in some]) for b in range(BATCHES)]
+        light = room_light(some[0].cells, stacked, _beam(matrices, sun, group, g), sun.suns)
+        found = iter(np.mean(light, axis=0).reshape(len(some), S, -1))
+    dark = np.zeros((S, len(sun.sky.illuminance)))
+    return [dark if room is None else _all_hours(sun, next(found)) for room in rooms]
+
+
+def _beam(matrices: PhaseMatrices, sun: ReflectedSun, group: GroupCoefficients, g: int) -> Beam:
+    """The sun's beam through a group, from points on it."""
+    scenes, points = (sun.inside, sun.outside), matrices.sampling.sun_points
+    return Beam(scenes, g, group.optics.scattering, points, tuple(_seeds(matrices)))
+
+
 def _outdoors_seen(
     matrices: PhaseMatrices, sun: ReflectedSun, groups: Sequence[tuple[int, GroupCoefficients]]
 ) -> list[Sequence[NDArray[np.float32]]]:
@@ -156,9 +179,7 @@ def _to_sensors(
     parts, in_room = matrices.parts.of(g), []
     rest = [without_straight(matrices, group, q) for q in parts]
     if room is not None and beam_matrix(group.optics).any():
-        scenes, points = (sun.inside, sun.outside), matrices.sampling.sun_points
-        beam = Beam(scenes, g, group.optics.scattering, points, tuple(_seeds(matrices)))
-        in_room = room_light(room.cells, room.shares, beam, sun.suns)
+        in_room = room_light(room.cells, room.shares, _beam(matrices, sun, group, g), sun.suns)
 
     def light_of(batch: int) -> NDArray[np.float64]:
         """The light of the sensors in the hours with sun [S, h]."""

@@ -7,15 +7,16 @@ of incidence (rank one: spectrum of the panes, times angles of the visible band)
 
 so that nothing is traced again where the surfaces reflect all channels equally: V, D and their kin
 are those of the visible band, and what was traced through a group is scaled by its factor at the
-angle that it came from.
+angle that it came from.  Rooms with colour are traced in a few bands q of reflectance
+(`coloured_room`), and V is the sum of these by b_q(lambda).
 
 All of this is linear in r_c and in the spectrum of the sky.  The factors of all channels are sums
-of a few modes m, r_c = sum a_cm r_m, and skies are sums of the three components k of CIE daylight.
+of a few modes m, r_c = sum a_cm r_m, and skies are sums of a few components k.
 A detector that weighs the channels by w_c receives
 
     E = sum_k (sum_cm w_c a_cm S_kc V T_m D) s_k + sum_cm w_c a_cm (E_m of the sun) sun_c
 
-which are three products with the sky for any number of channels.
+which are a few products with the sky for any number of channels.
 
     sensors by patches       r_c at the patch of incidence
     straight view            r_c at the patch of the sky; of what the outdoors reflects, the mean
@@ -39,6 +40,7 @@ from mitsuba_cfs.methods.coefficients import (
     sun_shares,
     without_straight,
 )
+from mitsuba_cfs.methods.coloured_room import RoomInBand, rooms_in_bands
 from mitsuba_cfs.methods.light import SeasonalLight, seasons_of
 from mitsuba_cfs.methods.optics import SystemOptics, combinations
 from mitsuba_cfs.methods.phase_light import (
@@ -61,7 +63,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.spectra.channels import Channels
-from mitsuba_cfs.spectra.daylight import COMPONENTS, WATER_CM, SpectralSky, daylight_components, spectral_sky
+from mitsuba_cfs.spectra.daylight import WATER_CM, SpectralSky, spectral_sky
 from mitsuba_cfs.spectra.detectors import NANOMETRES
 from mitsuba_cfs.surfaces import WindowGroup
 from mitsuba_cfs.trace.kernels.scattering import Scattering
@@ -76,6 +78,7 @@ class ModeOptics:
 
     visible: SystemOptics
     factor: Array  # [K] r_m of the patches of incidence
+    mirrored: float = 1.0  # what it reflects of the room's light, over visible light
 
     @property
     def transmission(self) -> Array:
@@ -94,8 +97,9 @@ class ModeOptics:
 
     @property
     def reflection(self) -> Array | None:
-        """See `SystemOptics`; of the visible band."""
-        return self.visible.reflection
+        """See `SystemOptics`; that of the visible band times a number."""
+        reflection = self.visible.reflection
+        return reflection if reflection is None or self.mirrored == 1.0 else reflection * self.mirrored
 
     @property
     def outdoor_reflection(self) -> Array | None:
@@ -131,15 +135,19 @@ def spectral_light(
     wanted: Sequence[Detection],
     state: NDArray[np.int64] | None = None,
     *,
+    reflectance: Array | None = None,
     water_cm: ArrayLike = WATER_CM,
+    clear: str = "cie",
     progress: Progress = silent,
 ) -> SpectralLight:
     """What detectors receive of the light of the sensors.
 
     Args:
         factors: of the systems of the light [G][J].
+        reflectance: diffuse reflectance of the room's surfaces [F, N]; neutral by default.
         state: of each window group in each hour [G, L]; the first by default.
         water_cm: precipitable water of the atmosphere [L] or of all hours.
+        clear: spectrum of a clear sky, one of `SKY_SPECTRA`.
 
     Raises: `ValueError` for path tracing, which has no matrices.
     """
@@ -154,7 +162,8 @@ def spectral_light(
         if not isinstance(phase, PhaseLight):
             raise ValueError("path tracing has no matrices: expected the light of a phase method")
         water = np.broadcast_to(np.asarray(water_cm, dtype=float), (hours_of_all,))[hours]
-        season = _Season(with_sensor_light(phase), factors, channels, water)
+        skies = sky_spectra(phase.sky, water, clear)
+        season = _Season(with_sensor_light(phase), factors, channels, skies, reflectance)
         outdoors += season.sky.horizontal.sum(axis=0)
         rows = states_of(phase, None if state is None else state[:, hours])
         for kind, some in combinations(rows):
@@ -169,8 +178,8 @@ def spectral_light(
     return SpectralLight(tuple(received), outdoors)
 
 
-def sky_spectra(sky: AnnualSky, water_cm: ArrayLike = WATER_CM) -> SpectralSky:
-    """The spectra of the skies, grounds and suns of hours."""
+def sky_spectra(sky: AnnualSky, water_cm: ArrayLike = WATER_CM, clear: str = "cie") -> SpectralSky:
+    """The spectra of the skies, grounds and suns of hours; clear: one of `SKY_SPECTRA`."""
     luminance = sky.without_sun()
     return spectral_sky(
         luminance,
@@ -178,30 +187,40 @@ def sky_spectra(sky: AnnualSky, water_cm: ArrayLike = WATER_CM) -> SpectralSky:
         np.asarray(sky.illuminance, dtype=float),
         sky.direction[:, 2],
         water_cm,
+        clear,
     )
 
 
 class _Season:
     """The light of the hours of one season, in the modes of its systems' factors."""
 
-    def __init__(self, light: PhaseLight, factors: Factors, channels: Channels, water_cm: Array) -> None:
-        self._light, self.sky = light, sky_spectra(light.sky, water_cm)
+    def __init__(
+        self, light: PhaseLight, factors: Factors, channels: Channels, sky: SpectralSky, reflectance: Array | None
+    ) -> None:
+        self._light, self.sky = light, sky
         # power of sun and ground in each band per lumen and of the sky's components
         self._sun, self._ground = channels.power(self.sky.sun), channels.power(self.sky.ground)
-        self._components = channels.power(daylight_components())  # [k, C]
+        self._components = channels.power(self.sky.components)  # [k, C]
         lit = sensor_light(light)
         distinct = {id(factor): factor for of in factors for factor in of}
-        self._shares, angles = _modes(list(distinct.values()), channels)  # [C, M]
+        of_factors, angles = _modes(list(distinct.values()), channels)  # [C, M]
         known = dict(zip(distinct, angles, strict=True))
         self._angles = [[known[id(factor)] for factor in of] for of in factors]
-        groups = [
-            [_GroupInState(light, lit[g][j], g, self._angles[g][j]) for j in traced_states(states)]
-            for g, states in enumerate(light.systems)
-        ]
-        self._modes = [self._in_mode(groups, m) for m in range(self._shares.shape[1])]
+        rooms, of_rooms = rooms_in_bands(light, reflectance, factors, channels)
+        self._shares = np.einsum("cq,cm->cqm", of_rooms, of_factors).reshape(channels.count, -1)
+        self._modes = []
+        for room in rooms:
+            groups = [
+                [
+                    _GroupInState(light, lit[g][j], g, self._angles[g][j], room, beam)
+                    for j, beam in zip(traced_states(states), room.beams[g], strict=True)
+                ]
+                for g, states in enumerate(light.systems)
+            ]
+            self._modes += [self._in_mode(groups, m, room) for m in range(of_factors.shape[1])]
 
-    def _in_mode(self, groups: Sequence[Sequence[_GroupInState]], m: int) -> PhaseLight:
-        """The light in a mode, under the photopic sun."""
+    def _in_mode(self, groups: Sequence[Sequence[_GroupInState]], m: int, room: RoomInBand) -> PhaseLight:
+        """The light in a mode of a room, under the photopic sun."""
         light = self._light
         # a state between two others is the mean of them in each mode too
         sensors = tuple(
@@ -209,10 +228,10 @@ class _Season:
             for states, traced in zip(light.systems, groups, strict=True)
         )
         systems = [
-            [ModeOptics(one, of.patches[m]) for one, of in zip(states, angles, strict=True)]
-            for states, angles in zip(light.systems, self._angles, strict=True)
+            [ModeOptics(one, of.patches[m], k) for one, of, k in zip(states, angles, mirrored, strict=True)]
+            for states, angles, mirrored in zip(light.systems, self._angles, room.mirrored, strict=True)
         ]
-        return replace(light, systems=systems, sensors=sensors)
+        return replace(light, matrices=room.matrices, systems=systems, sensors=sensors)
 
     def modes_in(self, kind: Sequence[int], hours: NDArray[np.int64]) -> _Modes:
         """The light in all modes in some hours, with each group in a state [G]."""
@@ -270,7 +289,7 @@ class _Modes:
         coefficients = self.coefficients[:, sensors]
         D, M, s = len(weights), len(coefficients), coefficients.shape[1]
         values = np.zeros((D, s * self.amount.shape[-1]))
-        for k in range(COMPONENTS):
+        for k in range(len(self.components)):
             mixed = np.tensordot(weights, self.components[k], (1, 0)).astype(np.float32)  # [D, M]
             if D < M:
                 rows = np.tensordot(mixed, coefficients, 1).reshape(D * s, -1)
@@ -314,11 +333,13 @@ class _Angles:
 
 
 class _GroupInState:
-    """The light of the sensors through a group in a state, as modes scale it."""
+    """The light of the sensors through a group in a state, in a band of the room, as modes scale it."""
 
-    def __init__(self, light: PhaseLight, one: SensorLight, g: int, angles: _Angles) -> None:
-        matrices, coefficients = light.matrices, one.coefficients
-        self._one, self._angles = one, angles
+    def __init__(
+        self, light: PhaseLight, one: SensorLight, g: int, angles: _Angles, room: RoomInBand, beam: Array | None
+    ) -> None:
+        matrices, coefficients = room.matrices, one.coefficients
+        self._one, self._angles, self._beam = one, angles, beam
         parts = matrices.parts.of(g)
         self._daylight = [matrices.daylight.values[q] for q in parts]
         self._rest = [without_straight(matrices, coefficients, q) for q in parts]
@@ -333,7 +354,8 @@ class _GroupInState:
         if one.added is not None and one.beam_in_room is not None:
             self._straight_outdoors = one.added - one.beam_in_room
             if light.reflected is not None:
-                self._straight_outdoors -= replaced_through(light.reflected, parts, self._rest)
+                visible = [without_straight(light.matrices, coefficients, q) for q in parts]
+                self._straight_outdoors -= replaced_through(light.reflected, parts, visible)
         group = matrices.scene.groups[g]
         sky = ReinhartSky(matrices.sampling.subdivision).directions
         self._to_sky = angles.towards(group, sky)  # [M, P]
@@ -356,8 +378,8 @@ class _GroupInState:
             if by_sun is not None and straight.direct is not None:
                 by_sun = by_sun + scaled
         beam, added = self._to_sun[m], one.added
-        if added is not None and one.beam_in_room is not None:
-            added = one.beam_in_room * beam
+        if added is not None and self._beam is not None:
+            added = self._beam * beam
             added += self._straight_outdoors * (self._seen @ patches)
             if self._reflected is not None:
                 shares = [rest * patches for rest in self._rest]

@@ -4,6 +4,9 @@ sky    CIE daylight (D-series) of a correlated colour temperature that follows t
        each patch where the sky is clear and is 6514 K where it is overcast
 sun    Bird and Riordan's beam through the hour's air mass and water vapour
 ground neutral, under the whole daylight of the hour
+
+With "spectrl2" a clear sky has the spectrum of Bird and Riordan's diffuse light on a horizontal plane,
+in all its patches; the overcast sky stays.
 """
 
 from __future__ import annotations
@@ -23,7 +26,8 @@ LEAST_K, MOST_K = 4000.0, 25000.0  # that CIE's daylight is defined for
 WATER_CM, OZONE_CM, AEROSOL_500NM, PRESSURE_PA = 1.42, 0.34, 0.084, 101325.0
 LOWEST_SUN = 0.05  # sine of the altitude below which its colour stays as there (87 degrees zenith)
 TABLE_STEPS = 1 << 14  # of mired, in which the components are tabulated: steps of 0.013
-COMPONENTS = 3  # S_0, S_1, S_2 of CIE daylight
+SKY_SPECTRA = ("cie", "spectrl2")  # of the clear sky
+COMPONENT_ERROR = 1e-3  # largest part of the skies' spectra that their components leave out
 
 
 def sky_temperature(luminance: ArrayLike, clear: ArrayLike) -> NDArray[np.floating]:
@@ -66,9 +70,16 @@ def daylight_components() -> FloatArray:
 
 
 def sun_spectra(height: ArrayLike, water_cm: ArrayLike = WATER_CM) -> FloatArray:
-    """Relative spectra [L, N] of the sun's beam by the sine of its altitude [L].
+    """Relative spectra [L, N] of the sun's beam by the sine of its altitude [L]; see `clear_spectra`."""
+    return clear_spectra(height, water_cm)[0]
+
+
+def clear_spectra(height: ArrayLike, water_cm: ArrayLike = WATER_CM) -> tuple[FloatArray, FloatArray]:
+    """Spectra [L, N] of the sun's beam and of the clear sky's diffuse light on a horizontal plane.
 
     Ozone, aerosol and pressure are those of ASTM G173.
+
+    Args: height: sine of the sun's altitude [L].
 
     Source: Bird and Riordan 1986 (`pvlib.spectrum.spectrl2`).
     """
@@ -89,8 +100,12 @@ def sun_spectra(height: ArrayLike, water_cm: ArrayLike = WATER_CM) -> FloatArray
         aerosol_turbidity_500nm=AEROSOL_500NM,
         dayofyear=np.ones_like(zenith),
     )
-    nm, beam = spectrum["wavelength"], np.reshape(spectrum["dni"], (-1, len(zenith)))
-    return np.stack([np.interp(NANOMETRES, nm, column) for column in beam.T])
+
+    def every_nanometre(name: str) -> FloatArray:
+        columns = np.reshape(spectrum[name], (-1, len(zenith))).T
+        return np.stack([np.interp(NANOMETRES, spectrum["wavelength"], column) for column in columns])
+
+    return every_nanometre("dni"), every_nanometre("dhi")
 
 
 def water_vapour_cm(dry_bulb_c: ArrayLike, relative_humidity: ArrayLike) -> FloatArray:
@@ -108,11 +123,12 @@ def water_vapour_cm(dry_bulb_c: ArrayLike, relative_humidity: ArrayLike) -> Floa
 class SpectralSky:
     """Spectra of the skies and suns of hours L.
 
-    The radiance of a patch is the sum over the components of CIE daylight of `amount` times the
-    component; the ground's is its luminance times `ground`.
+    The radiance of a patch is the sum over the components of `amount` times the component; the
+    ground's is its luminance times `ground`.
     """
 
-    amount: NDArray[np.float32]  # [3, P, L] of each component, the ground first and 0
+    components: FloatArray  # [k, N]
+    amount: NDArray[np.float32]  # [k, P, L] of each component, the ground first and 0
     horizontal: FloatArray  # [L, N] irradiance of a horizontal plane outdoors [W/(m2 nm)]
     ground: FloatArray  # [L, N] the same per lumen
     ground_luminance: FloatArray  # [L] [cd/m2]
@@ -125,6 +141,7 @@ def spectral_sky(
     beam: FloatArray,
     height: FloatArray,
     water_cm: ArrayLike = WATER_CM,
+    clear: str = "cie",
 ) -> SpectralSky:
     """The spectra of sky, ground and sun of hours.
 
@@ -132,11 +149,28 @@ def spectral_sky(
         luminance: [P, L] of ground and sky without the sun, the ground first [cd/m2].
         weights: [P] projected solid angles of the patches for a horizontal plane; the ground's 0.
         beam: [L] normal illuminance of the sun [lx]; height: [L] sine of its altitude.
+        clear: spectrum of a clear sky, one of `SKY_SPECTRA`.
     """
     horizontal = beam * np.maximum(height, 0.0)
     weights = np.asarray(weights, dtype=np.float32)  # as the luminances of the year
     sky = weights @ luminance
     share = horizontal / np.maximum(horizontal + sky, 1e-9)
+    sun, whole_sky = clear_spectra(height, water_cm)
+    if clear == "spectrl2":
+        components, amount = _of_hours(luminance, share, whole_sky)
+    else:
+        components, amount = daylight_components(), _by_luminance(luminance, share)
+    amount[:, 0] = 0.0
+    sun /= detected(sun)[:, :1]
+    diffuse = np.stack([weights @ one for one in amount], axis=-1) @ components
+    whole = diffuse + horizontal[:, None] * sun
+    lumens = detected(whole)[:, :1]
+    ground = np.divide(whole, lumens, out=sun.copy(), where=lumens > 0)
+    return SpectralSky(components, amount, whole, ground, np.asarray(luminance[0], dtype=float), sun)
+
+
+def _by_luminance(luminance: NDArray[np.floating], share: FloatArray) -> NDArray[np.float32]:
+    """Amounts [3, P, L] of the components of CIE daylight; share: of the sun in the light [L]."""
     per_lumen = detected(daylight_components())[:, 0].astype(np.float32)
     # shares depend on one number: a table is much faster than the patches of all hours
     steps = np.linspace(1e6 / MOST_K, 1e6 / LEAST_K, TABLE_STEPS)
@@ -145,14 +179,29 @@ def spectral_sky(
     number = 1e6 / sky_temperature(luminance, share.astype(np.float32)) - steps[0]
     number *= (TABLE_STEPS - 1) / (steps[-1] - steps[0])
     nearest = np.rint(number).astype(np.int32)
-    amount = np.empty((COMPONENTS, *luminance.shape), dtype=np.float32)
+    amount = np.empty((len(table), *luminance.shape), dtype=np.float32)
     for own, values in zip(amount, table, strict=True):
         np.multiply(values[nearest], luminance, out=own)
-    amount[:, 0] = 0.0
-    sun = sun_spectra(height, water_cm)
-    sun /= detected(sun)[:, :1]
-    diffuse = np.stack([weights @ one for one in amount], axis=-1) @ daylight_components()
-    whole = diffuse + horizontal[:, None] * sun
-    lumens = detected(whole)[:, :1]
-    ground = np.divide(whole, lumens, out=sun.copy(), where=lumens > 0)
-    return SpectralSky(amount, whole, ground, np.asarray(luminance[0], dtype=float), sun)
+    return amount
+
+
+def _of_hours(
+    luminance: NDArray[np.floating], share: FloatArray, clear: FloatArray
+) -> tuple[FloatArray, NDArray[np.float32]]:
+    """Components [k, N] and amounts [k, P, L] of skies of one spectrum in each hour.
+
+    Between clear [L, N] and overcast, spectra are mixed by the sun's share of the light (our choice).
+    """
+    overcast = daylight_shares(OVERCAST_K) @ daylight_components()
+    spectra = share[:, None] * (clear / detected(clear)[:, :1])
+    spectra += (1 - share)[:, None] * (overcast / detected(overcast)[0])
+    left, size, right = np.linalg.svd(spectra, full_matrices=False)
+    count = 1
+    while count < len(size):
+        rest = spectra - (left[:, :count] * size[:count]) @ right[:count]
+        if np.abs(rest).max() <= COMPONENT_ERROR * spectra.max():
+            break
+        count += 1
+    of_hours = (left[:, :count] * size[:count]).astype(np.float32)  # [L, k]
+    amount = np.asarray(luminance, dtype=np.float32)[None] * of_hours.T[:, None]
+    return right[:count], amount

@@ -44,6 +44,13 @@ def sensitivities() -> FloatArray:
     return np.array([v, *opic.T, *xyz])
 
 
+def is_illuminant(name: str) -> bool:
+    """Whether a name is that of one of CIE's illuminants."""
+    import colour
+
+    return name in colour.SDS_ILLUMINANTS
+
+
 @cache
 def illuminant(name: str) -> FloatArray:
     """Relative power [N] of one of CIE's illuminants, such as "D65", "A", "FL12", "E".
@@ -52,7 +59,7 @@ def illuminant(name: str) -> FloatArray:
     """
     import colour
 
-    if name not in colour.SDS_ILLUMINANTS:
+    if not is_illuminant(name):
         raise ValueError(f"illuminant {name!r}: expected one of CIE's, such as D65, A, FL12")
     table = colour.SDS_ILLUMINANTS[name]
     power: FloatArray = np.interp(NANOMETRES, table.wavelengths, table.values)

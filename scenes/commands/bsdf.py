@@ -194,7 +194,13 @@ def _from_radiance(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @command.command()
 @click.argument("file", type=FILE)
-@click.option("--incident", type=ANGLES, required=True, metavar="THETA PHI", help="Direction to the light [degrees].")
+@click.option(
+    "--incident",
+    type=ANGLES,
+    required=True,
+    metavar="THETA PHI",
+    help="Direction to the light [degrees]; theta above 90: from outdoors.",
+)
 @BAND_OPTION
 @click.option("--out", type=FILE, required=True, help="PNG, PDF or SVG to write.")
 def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> None:

@@ -81,6 +81,11 @@ def list_rules(context: click.Context, _: click.Parameter, value: bool) -> None:
 )
 @click.option("--uses", type=FILE, help="TOML file of room uses; see docs/comply.md.")
 @click.option(
+    "--lamps",
+    type=FILE,
+    help="Operation file: [[gains.luminaire]] with spectra and [[surface]], for rules of light at the eye.",
+)
+@click.option(
     "--day", default="03-21", show_default=True, metavar="MM-DD", help="Date for exposure to sunlight, 02-01 to 03-21."
 )
 @click.option(
@@ -114,7 +119,7 @@ def command(
     from scenes.result_folder import ResultFolder
 
     page_options = read_page(page, DossierSection, chosen_language())
-    inputs = (building, options.weather, options.system, options.closed, options.uses)
+    inputs = (building, options.weather, options.system, options.closed, options.uses, options.lamps)
     inputs += (*options.linked, *options.surroundings, *page_options.inputs)
     folder = ResultFolder(out, "comply", inputs=inputs)
     if write_ifc is not None:

@@ -56,8 +56,8 @@ EXAMPLES = {
     "ifc bonsai": ("cfs ifc bonsai --out cfs.zip",),
     "bsdf check": ("cfs bsdf check blind.xml",),
     "bsdf info": ("cfs bsdf info blind.xml",),
-    "bsdf plot": ("cfs bsdf plot blind.xml --incident 40 90 --out blind.png",),
-    "bsdf eval": ("cfs bsdf eval blind.xml --incident 40 90 --outgoing 140 270",),
+    "bsdf plot": ("cfs bsdf plot blind.xml --incident 140 90 --out blind.png",),
+    "bsdf eval": ("cfs bsdf eval blind.xml --incident 140 90 --outgoing 40 270",),
     "bsdf generate": (
         "cfs bsdf generate --tilt-deg 45 --depth-mm 80 --spacing-mm 72 --out slats.xml",
         "cfs bsdf generate --shape perforated --openness 0.1 --out sheet.xml",

@@ -29,11 +29,12 @@ from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.spectra.detectors import DETECTORS, detected, equivalent_daylight
 from scenes.comply.assess import asked_of, assess_room, values_of
 from scenes.comply.blinds import DEFAULT_NAME, open_and_closed
 from scenes.comply.dwellings import dwelling_words, judged, uses_of_rooms
 from scenes.comply.files import ComplyFiles, read_files
-from scenes.comply.findings import Findings, GridLight, RoomHeat, SeatGlare, calendar_of
+from scenes.comply.findings import EyeLight, Findings, GridLight, RoomHeat, SeatGlare, calendar_of
 from scenes.comply.glass import windows_without_view
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outdoors import OutdoorMesh, outdoors_of
@@ -57,11 +58,13 @@ from scenes.room.glare import rating_of
 from scenes.room.heat import heat_alone
 from scenes.room.inputs import RoomInputs, room_inputs, skies_for
 from scenes.room.light import RoomLight, grid_points, room_light
+from scenes.room.luminaires import lamp_spectra
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
 from scenes.room.room import StageTimes
 from scenes.room.series import RoomSeries, corner
 from scenes.room.solar import seasonal_outdoors
+from scenes.room.spectral import eye_illuminances
 from scenes.room.zone import room_zone, zone_surfaces
 from scenes.room_views import eyes_of
 from thermal.errors import ThermalInputError
@@ -190,6 +193,31 @@ def seat_glare(
     )
 
 
+def seat_eye(
+    room: RoomInputs, light: RoomLight, closed: NDArray[np.bool_] | None, tables: OperationTables | None
+) -> tuple[EyeLight, list[str]]:
+    """Light at the eye of a room, whose scene has turned eyes, and notes.
+
+    Args: closed: [H, G] as of `room_heat`; tables: the luminaires and colours of the room.
+    """
+    state = np.zeros((room.skies.hours, len(room.windows.groups)), dtype=np.int64)
+    if closed is not None:
+        state = closed[:, : state.shape[1]].astype(np.int64)
+    room = replace(room, operation=tables)
+    daylight, notes = eye_illuminances(room, light, state)
+    lamps = None
+    if tables is not None:
+        position, direction = (
+            np.asarray(a, dtype=float)[None] for a in (light.scene.eye.position, light.scene.eye.direction)
+        )
+        spectra = lamp_spectra(tables, room.space, position, direction, seed=room.options.sampling.seed)
+        if spectra is not None:
+            received = detected(spectra[0][0])
+            lamps = np.array([received[0], equivalent_daylight(received[DETECTORS.index("melanopic")])])
+    used = working_hours(room.weather, *room.options.occupancy.hours)
+    return EyeLight(daylight, lamps, used), notes
+
+
 def room_heat(
     room: RoomInputs, light: RoomLight, closed: NDArray[np.bool_] | None, *, progress: Progress = silent
 ) -> RoomHeat:
@@ -208,9 +236,15 @@ def room_heat(
 
 
 # the parts of a room's light, as the dossier's last line names their seconds
-PARTS = TRACING, SUMS, GLARE, HEAT = ("V and D", "light and blinds of every hour", "glare by pictures", "temperatures")
+PARTS = TRACING, SUMS, GLARE, HEAT, EYES = (
+    "V and D",
+    "light and blinds of every hour",
+    "glare by pictures",
+    "temperatures",
+    "light at the eye",
+)
 OnHead = Callable[[Head], None]
-LIGHT, RAYS = frozenset({"open", "operated", "glare", "heat"}), frozenset({"view", "sun"})
+LIGHT, RAYS = frozenset({"open", "operated", "glare", "heat", "eye"}), frozenset({"view", "sun"})
 
 
 def check_building(
@@ -301,6 +335,7 @@ class Check:
         self.day = sun_day(files.weather, *options.day, files.least_altitude_deg)
         self.outdoors: OutdoorMesh = outdoors_of(in_month(self.building, options.day[0]))
         self.seconds: dict[str, float] = {}
+        self.eye_notes: list[str] = []
         self.asked: Mapping[str, frozenset[str]] = {}  # parts that a room's own criteria need
         self.asked_uses: Mapping[str, RoomUse] = {}
 
@@ -317,12 +352,12 @@ class Check:
     @property
     def lit(self) -> bool:
         """Whether the rules look at light at all."""
-        return bool(self.parts & {"open", "operated", "heat"}) or self.glaring
+        return bool(self.parts & {"open", "operated", "heat", "eye"}) or self.glaring
 
     @property
     def moving(self) -> bool:
         """Whether something that real blinds change is looked at, LM-83's own sum apart."""
-        return self.glaring or "heat" in self.parts
+        return self.glaring or bool(self.parts & {"heat", "eye"})
 
     @property
     def glaring(self) -> bool:
@@ -383,8 +418,8 @@ class Check:
         return {result.space.guid: result for result in results}, issues, notes
 
     def _costly(self, space: Space) -> frozenset[str]:
-        """What of glare and heat a rule looks at in a room."""
-        return self.asked[space.guid] & {"glare", "heat"}
+        """What of glare, heat and the eye's light a rule looks at in a room."""
+        return self.asked[space.guid] & {"glare", "heat", "eye"}
 
     def _setups(self, space: Space) -> dict[str, OperationTables | None]:
         """The operation of a room by rule, of the rules that look at its heat.
@@ -405,12 +440,13 @@ class Check:
         rules = self.files.rules
         grids = {name: sensor_grid_of(space, rule.grid) for name, rule in rules.items()}
         distinct = list(dict.fromkeys(grids.values()))
+        eyes = "eye" in self._costly(space)
         room = room_inputs(
             self.building,
             space,
             self.systems,
             self.files.weather,
-            self.options.room,
+            self.options.room.changed(spectral=eyes),
             skies=skies,
             cache=cache,
             grids=distinct,
@@ -448,8 +484,14 @@ class Check:
                     heat = room_heat(operated_room, light, closed, progress=progress)
                     distinct_setups.append((setup, heat))
                 heats[name] = heat
+        eye = None
+        if eyes:
+            tables = None if self.files.lamps is None else self.files.lamps.tables.of_room(self.building, space)
+            with times.stage(EYES):
+                eye, notes = seat_eye(room, light, closed, tables)
+            self.eye_notes += notes
         self._took(times.seconds)
-        of_room = Findings(self.calendar, glare=glare)
+        of_room = Findings(self.calendar, glare=glare, eye=eye)
         lights = {name: found[distinct.index(grid)] for name, grid in grids.items()}
         values = {
             name: values_of(rules[name], replace(of_room, light=grid, heat=heats.get(name)), LIGHT)
@@ -464,7 +506,7 @@ class Check:
         """Included and omitted parts of each rule of heat; rules that ask for other weather."""
         weather = self.files.weather
         for rule in self.files.rules.values():
-            if "heat" not in rule.parts:  # theirs are listed by --list and in docs/comply.md
+            if not rule.parts & {"heat", "eye"}:  # theirs are listed by --list and in docs/comply.md
                 continue
             if not rule.fits(weather):
                 yield Note(
@@ -508,7 +550,9 @@ class Check:
         none = np.zeros((len(self.calendar.times), 1), dtype=np.float32)
         light = GridLight(np.zeros((1, 3)), none, none, np.zeros(1), none) if self.lit else None
         view = ViewOut(np.zeros((1, 3)), np.zeros(1), np.zeros(1), np.zeros((1, 3), dtype=bool))
-        findings = Findings(self.calendar, light, view, SunExposure((), ()))
+        used = working_hours(self.files.weather, *self.options.room.occupancy.hours)
+        eye = EyeLight(np.zeros((2, len(used))), None, used) if self.lit else None
+        findings = Findings(self.calendar, light, view, SunExposure((), ()), eye=eye)
         rules = self.files.rules
         values = {name: values_of(rule, findings, LIGHT | RAYS) for name, rule in rules.items()}
         verdicts = tuple(assess_room(rules, values, space, use))
@@ -562,6 +606,9 @@ class Check:
             yield glare_words(self.options, shaded=self.shaded)
         if self.lit:
             yield light_words(room)
+        if "eye" in self.parts:
+            yield eye_words(self.options, shaded=self.shaded)
+            yield from dict.fromkeys(self.eye_notes)
         if "heat" in self.parts:
             template = (
                 N_(
@@ -596,6 +643,18 @@ def glare_words(options: ComplyOptions, *, shaded: bool) -> str:
         start=start,
         end=end,
         pixels=options.room.outputs.picture_size,
+    )
+
+
+def eye_words(options: ComplyOptions, *, shaded: bool) -> str:
+    """Whose light at the eye is judged."""
+    blinds = Note("blinds closed by the rule of LM-83") if shaded else Note("all blinds open")
+    start, end = options.room.occupancy.hours
+    return Note(
+        "Light at the eye is that of one view in each room, with {blinds}, daily from {start} to {end} o'clock.",
+        blinds=blinds,
+        start=start,
+        end=end,
     )
 
 

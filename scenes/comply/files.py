@@ -14,6 +14,7 @@ from scenes.comply.uses import RoomUses, read_uses
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.input_files import InputFiles, check_building
 from scenes.input_files import read_files as read_inputs
+from scenes.room.operation import Operation, read_operation
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,7 @@ class ComplyFiles:
     rules: dict[str, RuleTable]  # by name
     uses: RoomUses
     closed: FenestrationSystem | None
+    lamps: Operation | None  # luminaires and colours of rooms
     least_altitude_deg: float
     altitude_source: str  # in words
 
@@ -49,7 +51,8 @@ def read_files(options: ComplyOptions) -> ComplyFiles:
     altitude, source = least_altitude(options, rules, inputs.weather)
     closed = None if options.closed is None else read_system(options.closed, by="--closed")
     uses = read_uses(options.uses)
-    return ComplyFiles(inputs, rules, uses, closed, altitude, source)
+    lamps = None if options.lamps is None else read_operation(options.lamps)
+    return ComplyFiles(inputs, rules, uses, closed, lamps, altitude, source)
 
 
 def least_altitude(options: ComplyOptions, rules: dict[str, RuleTable], weather: Weather) -> tuple[float, str]:

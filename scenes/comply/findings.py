@@ -77,6 +77,15 @@ class SeatGlare:
 
 
 @dataclass(frozen=True, slots=True)
+class EyeLight:
+    """Illuminance and melanopic EDI [lx] at the eye of a seat, in the direction of its view."""
+
+    daylight: FloatArray  # [2, H]
+    lamps: FloatArray | None  # [2] at full power; None where no spectrum of lamps is stated
+    occupied: NDArray[np.bool_]  # [H] the hours of use
+
+
+@dataclass(frozen=True, slots=True)
 class RoomHeat:
     """The temperatures of a room without heating and cooling."""
 
@@ -95,6 +104,7 @@ class Findings:
     sun: SunExposure | None = None
     glare: SeatGlare | None = None
     heat: RoomHeat | None = None
+    eye: EyeLight | None = None
 
     @property
     def daylight_hours(self) -> NDArray[np.bool_]:

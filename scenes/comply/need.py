@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
-from pydantic import model_validator
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
 
 from scenes.comply.findings import Findings
 from scenes.toml_file import TomlTable
 
 ROUNDING = 1e-9  # of shares of an area
+Clock = Annotated[int, Field(ge=0, le=24)]
 
 
 class Need(TomlTable):
@@ -45,3 +48,11 @@ class Need(TomlTable):
         if self.at_least is not None:
             return value >= self.at_least - ROUNDING
         return value <= (self.at_most or 0.0) + ROUNDING
+
+
+def at_clock(room: Findings, hours: tuple[int, int]) -> NDArray[np.bool_]:
+    """Whether each step [H] is within clock hours, which may pass midnight."""
+    start, end = hours
+    clock = room.calendar.times.hour.to_numpy()
+    inside = (clock >= start) & (clock < end)
+    return inside if start <= end else (clock >= start) | (clock < end)

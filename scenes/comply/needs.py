@@ -17,8 +17,9 @@ from pydantic import Field, model_validator
 from mitsuba_cfs.metrics.autonomy import area_share, daylight_autonomy
 from mitsuba_cfs.metrics.en17037 import HALF_TIME, exceeded, reached_on_area
 from mitsuba_cfs.metrics.lm83 import annual_sunlight_exposure
+from scenes.comply.eye_needs import EyeDays, EyeShare
 from scenes.comply.findings import Findings, RoomHeat
-from scenes.comply.need import Need
+from scenes.comply.need import Clock, Need, at_clock
 from scenes.language.catalogue import decimal, gettext, ngettext
 from scenes.language.numbers import listed
 from scenes.toml_file import Positive, Share, TomlTable
@@ -35,7 +36,6 @@ FloatArray = NDArray[np.float64]
 LONG = 60  # days after which the weights of an exponential mean are below 1e-5
 HEAT = frozenset({"heat"})
 Month = Annotated[int, Field(ge=1, le=12)]
-Clock = Annotated[int, Field(ge=0, le=24)]
 
 
 class LimitTable(TomlTable):
@@ -138,14 +138,6 @@ class HeatNeed(Need):
             start, end = self.hours
             text = gettext("{period}, {start} to {end} o'clock", period=text, start=start, end=end)
         return text
-
-
-def at_clock(room: Findings, hours: tuple[int, int]) -> NDArray[np.bool_]:
-    """Whether each step [H] is within clock hours, which may pass midnight."""
-    start, end = hours
-    clock = room.calendar.times.hour.to_numpy()
-    inside = (clock >= start) & (clock < end)
-    return inside if start <= end else (clock >= start) | (clock < end)
 
 
 class LimitedNeed(HeatNeed):
@@ -697,6 +689,8 @@ AnyNeed = Annotated[
     | WorstHours
     | PointHours
     | LightingEnergy
+    | EyeShare
+    | EyeDays
     | DegreeHours
     | HoursAbove
     | DayWeighted

@@ -19,6 +19,7 @@ class ComplyOptions(InputOptions):
     room: RoomOptions = field(default_factory=RoomOptions)  # how each room is computed
     closed: Path | None = None  # of every window with its blinds closed
     uses: Path | None = None  # mapping file of room uses
+    lamps: Path | None = None  # operation file with the luminaires and colours of rooms
     day: tuple[int, int] = (3, 21)  # of the sunlight: month and day
     least_altitude_deg: float | None = None  # of the sun; None: the rule's for the country
     eye_height: float = 1.2  # above the floor [m], of the view out and of glare

@@ -19,7 +19,7 @@ from mitsuba_cfs.files import reason
 CASE = "case.js"
 BEFORE, AFTER = "cfs.give(", ");\n"  # of the JSON in a data file, a script
 NAME = re.compile(r"(?:[\w-]+/)*data/[\w-]+", re.ASCII)
-TEXTS, LISTS = ("name", "file"), ("states", "models", "lux")  # of the entry of a room
+TEXTS, LISTS = ("name", "file"), ("states", "models", "lux", "melanopic")  # of the entry of a room
 PACKED = {"kind", "length", "data"}
 
 
@@ -71,7 +71,7 @@ def case_files(folder: Path, case: dict[str, Any]) -> Iterator[str]:
                 if not isinstance(_data(folder, f"{name}_{number}"), str):
                     raise DataError("is no text of codes", file=folder / f"{name}_{number}.js")
                 yield f"{name}_{number}.js"
-        for name in entry["lux"]:
+        for name in (*entry["lux"], *entry["melanopic"]):
             if not _is_packed(_data(folder, name)):
                 raise DataError("is no array of illuminances", file=folder / f"{name}.js")
             yield f"{name}.js"
@@ -80,6 +80,7 @@ def case_files(folder: Path, case: dict[str, Any]) -> Iterator[str]:
 def _check_entry(entry: Any, file: Path, room: str) -> None:
     if not isinstance(entry, dict):
         raise DataError("is no table", file=file, element=room)
+    entry.setdefault("melanopic", [])  # which runs without light by wavelength have not
     for key in (*TEXTS, *LISTS):
         value = entry.get(key)
         texts = value if key in LISTS else [value]

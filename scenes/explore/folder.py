@@ -165,7 +165,7 @@ def _copy_files(folder: Path, case: dict[str, Any], target: Path) -> None:
 
 def moved_entry(entry: dict[str, Any], place: str, name: str) -> dict[str, Any]:
     """The entry of a room whose files went into a folder, under another name."""
-    files = {key: [f"{place}/{one}" for one in entry[key]] for key in ("models", "lux")}
+    files = {key: [f"{place}/{one}" for one in entry[key]] for key in ("models", "lux", "melanopic")}
     return entry | files | {"name": name, "file": f"{place}/{entry['file']}"}
 
 
@@ -243,6 +243,7 @@ def _blind(year: PictureYear) -> NDArray[np.bool_]:
 
 
 LUX_STEP = 0.002  # of the logarithm of 1 + lux: an illuminance is kept to 0.1 %
+TINT_STEP = 1e-3  # of tints under white light
 TEMPERATURES = {"outdoor": "outdoor_c", "air": "air_c", "operative": "operative_c"}
 LOADS = {"heating": "heating_w", "cooling": "cooling_w", "lighting": "lighting_w"}
 
@@ -264,6 +265,9 @@ def write_room(
         write_pictures(folder / "data", f"{name}_state{j}", explored.pictures[j])
         codes = np.round(np.log1p(np.maximum(explored.illuminance[j], 0)) / LUX_STEP)
         write_data(folder / "data" / f"{name}_lux{j}.js", packed(codes, "u2"))
+        if explored.colour is not None:
+            codes = np.round(np.log1p(np.maximum(explored.colour.melanopic[j], 0)) / LUX_STEP)
+            write_data(folder / "data" / f"{name}_mel{j}.js", packed(codes, "u2"))
     facts = {
         "states": explored.states,
         "groups": len(explored.windows),
@@ -273,7 +277,11 @@ def write_room(
     }
     arrays = _arrays(result, room, explored)
     write_data(folder / "data" / f"{name}.js", {"facts": facts, "arrays": arrays})
-    files = {"models": [f"data/{name}_state{j}" for j in states], "lux": [f"data/{name}_lux{j}" for j in states]}
+    files = {
+        "models": [f"data/{name}_state{j}" for j in states],
+        "lux": [f"data/{name}_lux{j}" for j in states],
+        "melanopic": [f"data/{name}_mel{j}" for j in states] if explored.colour is not None else [],
+    }
     if shared is not None:
         files = {key: shared[key] for key in files}
     return {"name": room.space.label, "states": list(explored.states), "file": f"data/{name}", **files}
@@ -289,6 +297,15 @@ def _arrays(result: RunResult, room: RoomYear, explored: ExploredRoom) -> dict[s
         "operated": packed(explored.operated, "u1"),
         "blockers": packed(_blockers(result.building, room), "f4"),
     }
+    if explored.colour is not None:
+        colour = explored.colour
+        arrays |= {
+            "tint": packed(np.round(np.stack(colour.pixels) / TINT_STEP), "u2"),
+            "tint_indoors": packed(colour.indoors, "f4"),
+            "tint_sky": packed(colour.sky, "f4"),
+            "tint_sun": packed(colour.sun, "f4"),
+            "melanopic_eye": packed(colour.eye, "f4"),
+        }
     for g, triangles in enumerate(explored.windows):
         arrays[f"group{g}"] = packed(triangles, "f4")
     for name, column in TEMPERATURES.items():

@@ -157,14 +157,14 @@ class AngularData(TomlTable):
 
 def read_angular_table(path: Path) -> AngularTable:
     """A CSV file of `ANGULAR_COLUMNS`, and of `ANGULAR_OPTIONAL` those that are known."""
-    columns = _columns(path, ANGULAR_COLUMNS, ANGULAR_OPTIONAL)
+    columns = csv_columns(path, ANGULAR_COLUMNS, ANGULAR_OPTIONAL)
     try:
         return AngularTable(np.radians(columns.pop("theta_deg")), **columns)
     except ValueError as error:
         raise DataError(str(error), file=path) from error
 
 
-def _columns(path: Path, required: Sequence[str], optional: Sequence[str] = ()) -> dict[str, NDArray[np.float64]]:
+def csv_columns(path: Path, required: Sequence[str], optional: Sequence[str] = ()) -> dict[str, NDArray[np.float64]]:
     """The columns of numbers of a CSV file; `DataError` where one is missing or no number."""
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
@@ -433,7 +433,7 @@ def read_spectrum(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]
 
     Raises: `DataError` for a file that cannot be read or does not span 380 to 780 nm.
     """
-    columns = _columns(path, SPECTRUM_COLUMNS, SPECTRUM_OPTIONAL)
+    columns = csv_columns(path, SPECTRUM_COLUMNS, SPECTRUM_OPTIONAL)
     nm, tau = columns["wavelength_nm"], columns["transmittance"]
     rho = columns.get("reflectance", np.zeros_like(nm))
     if len(nm) < 2 or np.any(np.diff(nm) <= 0) or tau.min() < 0 or not tau.any():

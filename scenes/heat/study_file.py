@@ -146,6 +146,8 @@ class StudyFile(OperationTables, ReadTable, OutdoorTable):
 
     @model_validator(mode="after")
     def _fits(self) -> StudyFile:
+        if self.surface:
+            raise ValueError("surface: light by wavelength is computed by cfs run and cfs study")
         if self.heat_island is not None and self.measured is not None:
             raise ValueError("heat_island: measured weather is taken as it is")
         if (self.building is None) == (self.box is None):

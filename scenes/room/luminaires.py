@@ -1,24 +1,31 @@
-"""Luminaires of a room's tables by their photometry: power, and light on the work plane."""
+"""Luminaires of a room's tables by their photometry: power, light on the work plane, spectrum."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bim.electric_light import Luminaire, lamp_light
 from bim.model import Building, Space
 from bim.sensors import in_room, sensor_grid
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.metrics.photometry import Photometry, read_photometry
+from mitsuba_cfs.metrics.photometry import read_photometry
+from mitsuba_cfs.spectra.detectors import NANOMETRES, detected, illuminant, is_illuminant
+from scenes.fenestration.thermal_file import csv_columns
 from scenes.room.operation_tables import GainsTable, LuminaireTable, OperationTables
 from scenes.room.options import SensorGrid
+
+FloatArray = NDArray[np.float64]
+LAMP_COLUMNS = ("wavelength_nm", "power")
 
 
 def with_luminaires(
     tables: OperationTables, building: Building, space: Space, grid: SensorGrid, *, seed: int = 0
 ) -> OperationTables:
-    """The tables with the lamps' power and light in place of the luminaires of the room.
+    """The tables with the lamps' power and light besides the luminaires of the room.
 
     Power is that of the files, light the mean of the work plane's sensors by all luminaires, or with
     zones that at the sensor of each.
@@ -30,23 +37,16 @@ def with_luminaires(
     stated = tables.gains.luminaire
     if not stated:
         return tables
-    known: dict[object, Photometry] = {}
     lamps, watts, zones = [], [], []
     for number, one in enumerate(stated):
-        field = f"gains.luminaire.{number}"
-        if one.file not in known:
-            known[one.file] = read_photometry(one.file)
-        photometry = known[one.file]
+        lamps += _in_room(one, number, space)
+        photometry = lamps[-1].photometry
         power = photometry.watts if one.watts is None else one.watts
         if power <= 0:
+            field = f"gains.luminaire.{number}"
             raise DataError("states no power: state `watts`", file=one.file, field=field)
-        for k in range(one.number):
-            place = np.array(one.position) + k * np.array(one.step)
-            if not in_room(space, place[None])[0]:
-                raise DataError("is outside the room", element=space.label, field=f"{field}.position")
-            lamps.append(Luminaire(photometry, tuple(place.tolist()), one.turned_deg))
-            watts.append(power)
-            zones.append(one.zone)
+        watts += [power] * one.number
+        zones += [one.zone] * one.number
     points = sensor_grid(space, spacing=grid.spacing, height=grid.height, margin=grid.margin)[0]
     light = lamp_light(space, lamps, points, seed=seed)
     at_sensors, parts = light.direct + light.reflected, []
@@ -59,7 +59,6 @@ def with_luminaires(
     changed = {
         "lighting_w_m2": sum(watts) / space.floor_area,
         "lighting_full_lx": light.mean,
-        "luminaire": (),
         "lighting_zone": tuple(parts),
     }
     return tables.model_copy(update={"gains": tables.gains.model_copy(update=changed)})
@@ -100,3 +99,92 @@ def _of_model(gains: GainsTable, building: Building, space: Space) -> GainsTable
         if file is not None
     ]
     return gains.model_copy(update={"luminaire": tuple(tables), "luminaires": ""})
+
+
+def _in_room(table: LuminaireTable, number: int, space: Space) -> list[Luminaire]:
+    """The luminaires of a table; `DataError` for one outside the room."""
+    photometry, lamps = read_photometry(table.file), []
+    for k in range(table.number):
+        place = np.array(table.position) + k * np.array(table.step)
+        if not in_room(space, place[None])[0]:
+            raise DataError("is outside the room", element=space.label, field=f"gains.luminaire.{number}.position")
+        lamps.append(Luminaire(photometry, tuple(place.tolist()), table.turned_deg))
+    return lamps
+
+
+def lamp_spectra(
+    tables: OperationTables, space: Space, points: FloatArray, normals: FloatArray, *, seed: int = 0
+) -> tuple[FloatArray, FloatArray] | None:
+    """Light of the luminaires at full power at sensors [S, N] [W/(m2 nm)], and all of it [S] [lx].
+
+    The room's surfaces reflect it as visible light.  Luminaires without a spectrum are left out of
+    the first; None where no luminaire has one.
+    """
+    stated = tables.gains.luminaire
+    if not any(one.spectrum for one in stated):
+        return None
+    power, whole = np.zeros((len(points), len(NANOMETRES))), np.zeros(len(points))
+    for number, one in enumerate(stated):
+        light = lamp_light(space, _in_room(one, number, space), points, normals, seed=seed)
+        lux = light.direct + light.reflected
+        whole += lux
+        if one.spectrum:
+            power += lux[:, None] * lamp_spectrum(one.spectrum)
+    return power, whole
+
+
+def placed_spectrum(text: str, folder: Path) -> str:
+    """The name of a CIE illuminant, or the absolute path of a file in a folder.
+
+    Raises: `DataError` for neither, or a file that is no spectrum.
+    """
+    if is_illuminant(text):
+        return text
+    file = (folder / text).absolute()
+    if not file.is_file():
+        raise DataError(f"no such file, nor an illuminant of CIE (LED-B3, FL11, A): {text}")
+    lamp_spectrum(str(file))
+    return str(file)
+
+
+def lamp_spectrum(source: str) -> FloatArray:
+    """Spectrum [N] of a lamp per lumen [W/(lm nm)]: of a CIE illuminant, a CSV or an SPDX file.
+
+    Raises: `DataError` for a file that is no spectrum of visible light.
+
+    Source: IES TM-27-20 (SPDX).
+    """
+    if is_illuminant(source):
+        power = illuminant(source)
+    else:
+        path = Path(source)
+        if path.suffix.casefold() == ".csv":
+            nm, values = (csv_columns(path, LAMP_COLUMNS)[name] for name in LAMP_COLUMNS)
+        else:
+            nm, values = _spdx(path)
+        if len(nm) < 2 or np.any(np.diff(nm) <= 0) or nm[0] > 400 or nm[-1] < 700:
+            raise DataError("expected rising wavelengths from 400 to 700 nm at least", file=path)
+        if values.min() < 0 or not np.isfinite(values).all():
+            raise DataError("expected powers that are not negative", file=path)
+        power = np.interp(NANOMETRES, nm, values, left=0.0, right=0.0)
+    lumens = float(detected(power)[0])
+    if lumens <= 0:
+        raise DataError("has no visible light", file=source)
+    return power / lumens
+
+
+def _spdx(path: Path) -> tuple[FloatArray, FloatArray]:
+    """Wavelengths [nm] and powers of a file of IES TM-27."""
+    try:
+        root = ElementTree.fromstring(path.read_bytes())
+        rows = [
+            (float(item.attrib["wavelength"]), float(item.text or ""))
+            for item in root.iter()
+            if item.tag.rpartition("}")[2] == "SpectralData"
+        ]
+    except (ElementTree.ParseError, KeyError, ValueError) as error:
+        raise DataError(f"is no spectrum of IES TM-27 (SPDX): {error}", file=path) from None
+    if not rows:
+        raise DataError("is no spectrum of IES TM-27 (SPDX): no SpectralData", file=path)
+    nm, values = np.array(rows).T
+    return nm, values

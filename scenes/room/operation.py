@@ -25,10 +25,12 @@ from scenes.fenestration.systems import FenestrationSystem, read_system, system_
 from scenes.fenestration.thermal_file import StateTable
 from scenes.fenestration.thermal_system import checked_system
 from scenes.fenestration.tilts import tilt_states
+from scenes.room.luminaires import placed_spectrum
 from scenes.room.operation_tables import PARTS, GainsTable, OperationTables, RoomsTable, operated_tables
 from scenes.room.options import RoomOptions
 from scenes.room.schedules import WEEK, ScheduleTable, scheduled_fields
 from scenes.room.shading_rules import WEATHER_RULES, ShadingRule
+from scenes.room.surface_spectra import read_reflectance
 from scenes.toml_file import TomlTable, read_table, validated
 from thermal.control import by_schedule, by_threshold
 from thermal.emitters import HeatedSlab, IdealLoads
@@ -313,8 +315,10 @@ class Operation:
         states = [table.placed(self.file.parent) for table in self.tables.system]
         panes = [layer.pane for table in states if table.bsdf is None for layer in table.layers]
         named = [None if table.bsdf is None else self.file.parent / table.bsdf for table in states]
-        lamps = (one.file for v in self.tables.variants for one in v.gains.luminaire)
-        files = (*named, *panes, *tables, self.tables.control_of, *lamps)
+        lamps = [one for v in self.tables.variants for one in v.gains.luminaire]
+        light = [Path(one.spectrum) for one in lamps if one.spectrum and Path(one.spectrum).is_absolute()]
+        colours = [one.spectrum for one in self.tables.surface]
+        files = (*named, *panes, *tables, self.tables.control_of, *(one.file for one in lamps), *light, *colours)
         return tuple(path for path in files if path is not None)
 
     def outdoors(self, weather: Weather) -> Weather:
@@ -393,7 +397,16 @@ def schedules_there(tables: Tables, path: Path) -> Tables:
             field = f"schedules.{name}.csv"
             raise DataError(f"no such file: {schedule.csv}", file=path, field=field)
         schedules[name] = schedule.model_copy(update={"csv": csv})
-    update = {"schedules": schedules, "gains": _placed(tables.gains, path)}
+    surfaces = []
+    for number, one in enumerate(tables.surface):
+        if one.spectrum is not None:
+            file = (path.parent / one.spectrum).absolute()
+            if not file.is_file():
+                raise DataError(f"no such file: {one.spectrum}", file=path, field=f"surface.{number}.spectrum")
+            read_reflectance(file)
+            one = one.model_copy(update={"spectrum": file})
+        surfaces.append(one)
+    update = {"schedules": schedules, "gains": _placed(tables.gains, path), "surface": tuple(surfaces)}
     rooms = tuple(one.model_copy(update={"gains": _placed(one.gains, path)}) for one in tables.rooms)
     return tables.model_copy(update=update | {"rooms": rooms})
 
@@ -409,7 +422,14 @@ def _placed(gains: GainsTable, path: Path) -> GainsTable:
         if not file.is_file():
             field = f"gains.luminaire.{number}.file"
             raise DataError(f"no such file: {one.file}", file=path, field=field)
-        placed.append(one.model_copy(update={"file": file}))
+        update: dict[str, Path | str] = {"file": file}
+        if one.spectrum is not None:
+            try:
+                update["spectrum"] = placed_spectrum(one.spectrum, path.parent)
+            except DataError as error:
+                field = f"gains.luminaire.{number}.spectrum"
+                raise DataError(error.message, file=error.file or path, field=error.field or field) from None
+        placed.append(one.model_copy(update=update))
     return gains.model_copy(update={"luminaire": tuple(placed)}) if placed else gains
 
 

@@ -25,6 +25,7 @@ from scenes.room.schedules import (
     unknown_name,
 )
 from scenes.room.shading_rules import ControlTable
+from scenes.room.surface_spectra import SurfaceTable
 from scenes.toml_file import Positive, Share, TomlTable
 from thermal.ground import SHIELDS, SOILS
 from thermal.ventilation import BLAST, DOE2, DOOR_DISCHARGE, Leakage, aim2, sherman_grimsrud
@@ -326,6 +327,8 @@ class LuminaireTable(TomlTable):
     number: Annotated[int, Field(ge=1, le=1000)] = 1
     step: tuple[float, float, float] = (0.0, 0.0, 0.0)  # from one to the next [m]
     watts: Annotated[Positive, plausible.POWER] | None = None  # where the file states none
+    # of its light: a CIE illuminant ("LED-B3", "FL11"), a CSV file of wavelength_nm and power, or SPDX
+    spectrum: str | None = None
 
     @model_validator(mode="after")
     def _steps(self) -> LuminaireTable:
@@ -486,6 +489,7 @@ class OperationTables(TomlTable):
     envelope: EnvelopeTable = EnvelopeTable()
     comfort: ComfortTable = ComfortTable()
     plant: PlantTable = PlantTable()
+    surface: tuple[SurfaceTable, ...] = ()  # colours, for light by wavelength; the first that fits
     terrain: Literal["country", "suburbs", "city"] = "suburbs"  # of the site, for the wind profile
     heat_island: HeatIslandTable | None = None  # air of a street in place of the weather station's
     rooms: tuple[RoomsTable, ...] = ()  # the first entry that names a room applies to it

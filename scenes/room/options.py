@@ -15,6 +15,7 @@ from mitsuba_cfs.methods import METHODS
 from mitsuba_cfs.methods.scene import Sampling
 from mitsuba_cfs.sky.options import GROUNDS, SUN_MODELS
 from mitsuba_cfs.spectra.channels import CHANNEL_SETS
+from mitsuba_cfs.spectra.daylight import SKY_SPECTRA
 
 GLARE_SOURCES = ("evalglare", "pixels")  # see `mitsuba_cfs.glare.evaluation.GROUPINGS`
 GLARE_SUN = ("source", "pixels")
@@ -69,6 +70,7 @@ class RoomOptions:
     # what windows do with light of sky and ground in the heat balance: by its directions, or by one
     # hemispherical value, as EnergyPlus, to show what that changes; the sun keeps its direction
     sky_light: str = "by direction"
+    sky_spectrum: str = "cie"  # of a clear sky, see `mitsuba_cfs.spectra.daylight`
 
     def __post_init__(self) -> None:
         if self.method not in METHODS:
@@ -147,6 +149,7 @@ NAMES = {
     "sun_model": ("", "sun_model"),
     "sky_ground": ("", "sky_ground"),
     "sky_light": ("", "sky_light"),
+    "sky_spectrum": ("", "sky_spectrum"),
     "path_samples": ("sampling", "hour_samples"),
     "heat_step_s": ("", "heat_step_s"),
     "infiltration_ach": ("", "infiltration_ach"),
@@ -176,6 +179,7 @@ CHOICES = {
     "sun_model": SUN_MODELS,
     "sky_ground": GROUNDS,
     "sky_light": SKY_LIGHTS,
+    "sky_spectrum": SKY_SPECTRA,
     "channels": tuple(CHANNEL_SETS),
 }
 

@@ -56,7 +56,7 @@ from scenes.room.options import RoomOptions
 from scenes.room.picture_hours import wanted_hours
 from scenes.room.shading import control_signals, predicts, room_conditions, ruled_year, temperature_conditions
 from scenes.room.solar import SeasonalOutdoors, seasonal_outdoors
-from scenes.room.spectral import room_spectral
+from scenes.room.spectral import explored_colour, room_spectral
 from scenes.room.zone import (
     RoomAlternatives,
     RoomZone,
@@ -229,8 +229,7 @@ def lit_room(
             explored = explored_room(room, light, state, sensors=len(daylight.points), progress=progress)
     if options.outputs.spectral:
         with times.stage("spectral"):
-            sensors = len(daylight.points)
-            spectral = room_spectral(room, light, state, sensors, progress=progress)
+            spectral = room_spectral(room, light, state, daylight, progress=progress)
     with times.stage("thermal"):
         surfaces = surfaces or zone_surfaces(room)
         if outdoors is None:
@@ -372,6 +371,9 @@ def explored_room(
         lit.append(illuminance(light, rows)[:sensors].astype(np.float32))
         eyes.append(eye_illuminance(light, rows))
     triangles = [np.concatenate([w.triangles for w in g.windows]) for g in scene.groups]
+    colour = None
+    if room.options.outputs.spectral:
+        colour = explored_colour(room, room_light, combinations, pictures, sensors)
     return ExploredRoom(
         tuple(_state_names(room, light.states, combinations)),
         operated,
@@ -382,6 +384,7 @@ def explored_room(
         np.stack(through).astype(np.float32),
         np.maximum(sky.illuminance, 0).astype(np.float32),
         tuple(triangles),
+        colour,
     )
 
 

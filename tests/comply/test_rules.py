@@ -21,7 +21,8 @@ from scenes.comply.assess import (
     assess_room,
     values_of,
 )
-from scenes.comply.findings import Findings, GridLight, SeatGlare, calendar_of
+from scenes.comply.eye_needs import EyeDays
+from scenes.comply.findings import EyeLight, Findings, GridLight, SeatGlare, calendar_of
 from scenes.comply.rules import NOT_MET, read_rule, rule_names
 from scenes.comply.sunlight import SunExposure
 from scenes.comply.tables import missed
@@ -306,3 +307,33 @@ def test_size_of_a_cell():
     assert en17037.greatest_cell(1.0, 10.0) == pytest.approx(0.5)
     with pytest.raises(ValueError, match="two sides"):
         en17037.greatest_cell(1.0, 0.0)
+
+
+def eye_light(calendar, melanopic, lamps=None):
+    """Light at the eye of a day's 24 values, every day, used from 8 to 18 o'clock."""
+    day = np.tile(np.asarray(melanopic, dtype=float), 365)
+    hour = np.tile(np.arange(24), 365)
+    both = None if lamps is None else np.array([lamps, lamps], dtype=float)
+    return Findings(calendar, eye=EyeLight(np.stack([day, day]), both, (hour >= 8) & (hour < 18)))
+
+
+def test_light_at_the_eye_lasts_without_a_break(calendar):
+    """Two hours on end; an interruption, an hour before use and one too few do not count."""
+    kept = [0] * 9 + [400, 400] + [0] * 13
+    broken = [400] * 9 + [0, 400, 0, 400] + [0] * 11
+    assert reached("ul-24480", eye_light(calendar, kept))["day"] == "about 350 lx (warm light)"
+    assert reached("ul-24480", eye_light(calendar, [v * 0.6 for v in kept]))["day"] == "about 200 lx (cool light)"
+    assert reached("ul-24480", eye_light(calendar, broken))["day"] == NOT_MET
+    all_day, most = [300] * 24, [300] * 17 + [100] * 7
+    assert reached("din-ts-67600", eye_light(calendar, all_day))["day"] != NOT_MET
+    assert reached("din-ts-67600", eye_light(calendar, most))["day"] == NOT_MET
+
+
+def test_melanopic_light_of_lamps_needs_their_spectrum(calendar):
+    assert reached("well-v2-l03", eye_light(calendar, [900] * 24))["l03"] == NOT_COMPUTED
+    assert reached("well-v2-l03", eye_light(calendar, [900] * 24, 100.0))["l03"] == NOT_MET
+    assert reached("well-v2-l03", eye_light(calendar, [0] * 24, 140.0))["l03"] == "1 point"
+    assert reached("well-v2-l03", eye_light(calendar, [0] * 24, 260.0))["l03"] == "3 points"
+    late = EyeDays(what="eye_days", lux=100, hours=2, begins_by=10, at_least=1.0)
+    assert late.value(eye_light(calendar, [0] * 10 + [200] * 14)) == 1.0
+    assert late.value(eye_light(calendar, [0] * 11 + [200] * 13)) == 0.0

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.picture_year.year import picture_year
-from scenes.results import ExploredRoom, RunResult
+from scenes.results import ExploredColour, ExploredRoom, RunResult
 from tests.report.synthetic import run_result
 
 TILE = 2  # pixels across of the squares that share their reflected light
@@ -61,6 +61,24 @@ class MadeUpPictures:
         return [(SunDisc(sun, light, 6.8e-5),) if shown else () for sun, shown in found]
 
 
+RED, WHITE = (1.8, 0.8, 0.6, 0.5), (1.0, 1.0, 1.0, 1.0)  # tints: red, green, blue, melanopic DER
+
+
+def _colours(years, hours: int, lux: NDArray[np.float32]) -> ExploredColour:
+    """Red surfaces and white windows; light of DER 0.8 indoors, 1.2 from the sky, 0.6 from the sun."""
+    pixels = []
+    for year in years:
+        tint = np.tile(np.array(RED, dtype=np.float32), (len(year.pixels), 1))
+        tint[year.window] = WHITE
+        pixels.append(tint)
+    indoors, sky, sun = (np.tile(np.array([1, 1, 1, d], dtype=np.float32), (hours, 1)) for d in (0.8, 1.2, 0.6))
+    two = (np.stack([one, one]) for one in (indoors, sun))
+    in_two, sun_in_two = two
+    return ExploredColour(
+        tuple(pixels), in_two, sky, sun_in_two, (0.9 * lux, 0.1 * lux), np.stack([lux.mean(axis=0)] * 2)
+    )
+
+
 def explored_run(*, step: int = STEP, size: int = SIZE) -> RunResult:
     """A run of two rooms, the first of which was computed for the explorer in two states."""
     result = run_result(picture_size=64, pictures=1)
@@ -82,5 +100,6 @@ def explored_run(*, step: int = STEP, size: int = SIZE) -> RunResult:
         through=np.stack(through).astype(np.float32),
         sun_illuminance=np.full(len(lit), 60_000, dtype=np.float32),
         windows=windows,
+        colour=_colours(years, len(lit), lux),
     )
     return replace(result, spaces=(replace(room, explored=explored), *result.spaces[1:]))

@@ -177,6 +177,35 @@ def test_looks_change_the_picture(page, run) -> None:
     assert _picture(page) not in seen
 
 
+def test_true_colour_and_melanopic_map(page, run) -> None:
+    hour = _bright(page, run)
+    explored = run.spaces[0].explored
+    number, window = int(np.flatnonzero(explored.lit == hour)[0]), explored.pictures[0].window
+    surface = int(np.setdiff1d(np.arange(len(explored.pictures[0].pixels)), window)[200])
+    grey = page.value("document.getElementById('colours').value = 'seen'") and _picture(page)
+    for value in ("true", "melanopic"):
+        page.value(f"(() => {{ colours.value = '{value}'; colours.dispatchEvent(new Event('change')); }})()")
+        page.value("new Promise((done) => setTimeout(done, 300))")
+        assert _picture(page) != grey
+        if value == "true":
+            place = int(explored.pictures[0].pixels[surface])
+            y, x = divmod(place, explored.pictures[0].view.width)
+            pen = "document.querySelector('#one .eye').getContext('2d')"
+            red, green, blue, _ = page.value(f"Array.from({pen}.getImageData({x}, {y}, 1, 1).data)")
+            assert red > green > blue
+    # a surface without sun: 0.5 of its own times 0.8 of the light; a window: 1.2
+    found = "cfs.explorer.found[0]"
+    ratio = f"(i) => cfs.melanopic({found}, {found}.tints)[i] / {found}.values[i]"
+    beam = page.value(f"{found}.ofBeam[{surface}]")
+    assert beam == 0
+    assert page.value(f"({ratio})({surface})") == pytest.approx(0.4, abs=1e-3)
+    assert page.value(f"({ratio})({int(window[0])})") == pytest.approx(1.2, abs=1e-3)
+    assert _text(page, "#one .quantity") == "Melanopic EDI of the work plane"
+    plane = page.value(f"Array.from({found}.melanopic)")
+    assert plane == pytest.approx((0.9 * explored.illuminance[0][:, number]).tolist(), rel=2e-3, abs=0.01)
+    assert "lx melanopic EDI at the eye" in _text(page, "#one .figures")
+
+
 def test_patches_of_sun_have_their_true_edges(page, run) -> None:
     """On the floor: what a ray to the sun that leaves by a window reaches, by the triangles."""
     room, hour = run.spaces[0], _bright(page, run)

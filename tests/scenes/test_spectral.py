@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -23,10 +24,12 @@ from scenes.fenestration.tilts import tilt_states
 from scenes.input_files import read_weather
 from scenes.report.spectral_figures import melanopic_against_glare
 from scenes.room.light import room_light
-from scenes.room.operation import read_state
+from scenes.room.luminaires import lamp_spectrum, placed_spectrum
+from scenes.room.operation import read_operation, read_state
 from scenes.room.options import RoomOptions
 from scenes.room.room import inputs_of_room
 from scenes.room.spectral import _factors, room_spectral
+from scenes.room.surface_spectra import SurfaceTable, room_reflectance
 from scenes.room.windows import in_all_windows
 from tests.scenes.test_tilts import family
 
@@ -66,7 +69,8 @@ def test_amber_light_is_hardly_melanopic(blind) -> None:
     systems = in_all_windows(space, read_system(blind))
     room = inputs_of_room(building, space, systems, read_weather(WEATHER), options)
     light, state = room_light(room), np.zeros((8760, 1), dtype=np.int64)
-    year = room_spectral(room, light, state, len(light.scene.points) - 3)
+    points = light.scene.points[:-3]
+    year = room_spectral(room, light, state, SimpleNamespace(points=points))
     # D65 through the fabric; bands of 25 to 35 nm at its edge
     fabric = np.interp(NANOMETRES, [380, 500, 520, 780], [0.0, 0.0, 0.2, 0.2])
     expected = daylight_efficacy_ratio(illuminant("D65") * fabric)
@@ -203,3 +207,66 @@ def test_hours_of_states_are_hours_in_weather_of_half_hours() -> None:
     room = SimpleNamespace(heat=heat, operation=None)
     chart = melanopic_against_glare(room, SimpleNamespace(eye=eye), np.full(10, 0.2))
     assert chart.classes[0][1].endswith(": 5 h")
+
+
+def operation_file(folder: Path, text: str) -> Path:
+    """An operation file with some tables."""
+    path = folder / "operation.toml"
+    path.write_text(text, "utf-8")
+    return path
+
+
+def test_colours_of_surfaces_are_those_stated_then_those_of_the_model(tmp_path) -> None:
+    space = shoebox().spaces[0]
+    wood = tmp_path / "oak.csv"
+    wood.write_text("wavelength_nm,reflectance\n380,0.1\n780,0.5\n", "utf-8")
+    text = '[[surface]]\nselect = "floor"\nspectrum = "oak.csv"\n[[surface]]\nselect = "LEFT*"\ncolour = "#c08070"\n'
+    tables = read_operation(operation_file(tmp_path, text)).tables.surface
+    red = replace(space.faces[0], hue=(3.0, 0.5, 0.1))
+    space = replace(space, faces=(red, *space.faces[1:]))
+    found, notes = room_reflectance(space, tables)
+    assert found is not None and found.shape == (len(space.faces), len(NANOMETRES))
+    weight = illuminant("D65") * detected(np.eye(len(NANOMETRES)))[:, 0]
+    visible = [face.reflectance("visible") for face in space.faces]
+    assert found @ weight / weight.sum() == pytest.approx(visible, rel=1e-3)
+    kinds = [face.kind for face in space.faces]
+    floor, left = found[kinds.index("floor")], found[[face.name for face in space.faces].index("left")]
+    assert floor[-1] / floor[0] == pytest.approx(5.0)
+    assert left[250] > 1.5 * left[60] and found[0, 250] > 1.5 * found[0, 60]
+    assert len(notes) == 1 and "with a colour in the model (1)" in notes[0]
+    assert room_reflectance(shoebox().spaces[0]) == (None, [])
+    other = room_reflectance(shoebox().spaces[0], (*tables[1:], SurfaceTable(select="no such", colour="#ff0000")))
+    assert [note for note in other[1] if "no such" in note]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('[[surface]]\nselect = "floor"\n', "expected spectrum or colour"),
+        ('[[surface]]\nselect = "floor"\ncolour = "red"\n', "expected #rrggbb"),
+        ('[[surface]]\nselect = "floor"\nspectrum = "none.csv"\n', "no such file: none.csv"),
+        ('[[surface]]\nselect = "floor"\nspectrum = "bad.csv"\n', "from 380 to 780 nm"),
+    ],
+)
+def test_faults_of_a_surface(tmp_path, text: str, message: str) -> None:
+    (tmp_path / "bad.csv").write_text("wavelength_nm,reflectance\n400,0.1\n780,0.5\n", "utf-8")
+    with pytest.raises(DataError, match=message):
+        read_operation(operation_file(tmp_path, text))
+
+
+def test_spectra_of_lamps(tmp_path) -> None:
+    nm = np.arange(400.0, 701.0, 10.0)
+    rows = "".join(f'<SpectralData wavelength="{w:g}">{v:g}</SpectralData>' for w, v in zip(nm, nm / 700, strict=True))
+    (tmp_path / "lamp.spdx").write_text(
+        f'<IESTM2714 xmlns="iestm2714" version="1.0"><SpectralDistribution>{rows}</SpectralDistribution></IESTM2714>'
+    )
+    table = "".join(f"{w:g},{v:g}\n" for w, v in zip(nm, nm / 700, strict=True))
+    (tmp_path / "lamp.csv").write_text("wavelength_nm,power\n" + table)
+    (tmp_path / "bad.spdx").write_text("<IESTM2714><SpectralData>1</SpectralData></IESTM2714>")
+    led, spdx, table = (lamp_spectrum(placed_spectrum(name, tmp_path)) for name in ("LED-B3", "lamp.spdx", "lamp.csv"))
+    assert spdx == pytest.approx(table)
+    assert detected(led)[0] == pytest.approx(1.0)
+    assert daylight_efficacy_ratio(led) == pytest.approx(0.6326, abs=1e-4)  # CIE S 026's toolbox
+    for name, message in (("none.csv", "no such file, nor an illuminant"), ("bad.spdx", "is no spectrum of IES TM-27")):
+        with pytest.raises(DataError, match=message):
+            placed_spectrum(name, tmp_path)

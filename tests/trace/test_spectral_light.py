@@ -9,6 +9,7 @@ import pytest
 
 from mitsuba_cfs.bsdf.angular import AngularTable, specular_matrices
 from mitsuba_cfs.bsdf.spectral_factor import ANGLES, SpectralFactor
+from mitsuba_cfs.methods.coloured_room import _by_surface, reflectance_bands
 from mitsuba_cfs.methods.light import illuminance
 from mitsuba_cfs.methods.optics import BetweenOptics, BsdfOptics
 from mitsuba_cfs.methods.phase_light import phase_light
@@ -16,7 +17,7 @@ from mitsuba_cfs.methods.spectral_light import Detection, _modes, sky_spectra, s
 from mitsuba_cfs.sky.annual import given_sky
 from mitsuba_cfs.spectra.channels import channels_of
 from mitsuba_cfs.spectra.daylight import daylight_components
-from mitsuba_cfs.spectra.detectors import NANOMETRES, illuminant
+from mitsuba_cfs.spectra.detectors import NANOMETRES, illuminant, sensitivities
 from mitsuba_cfs.surfaces import Surfaces
 from tests.trace.phase_rooms import traced
 
@@ -33,9 +34,9 @@ def tinted() -> SpectralFactor:
     return SpectralFactor(passed * (1 - (1 - np.cos(ANGLES)) ** 5)[:, None])
 
 
-def optics(transmittance: np.ndarray) -> BsdfOptics:
-    """Glass by its transmittance at `ANGLES`, which mirrors a tenth of the room's light."""
-    mirrored = np.full(len(ANGLES), 0.1)
+def optics(transmittance: np.ndarray, share: float = 0.1) -> BsdfOptics:
+    """Glass by its transmittance at `ANGLES`, which mirrors a share of the room's light."""
+    mirrored = np.full(len(ANGLES), share)
     table = AngularTable(ANGLES, transmittance * 0.9, mirrored, mirrored)
     return BsdfOptics(specular_matrices(table), angular=table)
 
@@ -173,3 +174,83 @@ def test_modes_of_a_deep_red_shade_leave_the_melanopic_light_as_it_is() -> None:
     for factor, own in zip(factors, modes, strict=True):
         true, found = (light @ r for r in (factor.of_patches(channels), shares @ own.patches))
         assert found[5] / found[0] == pytest.approx(true[5] / true[0], rel=1e-3)
+
+
+def coloured(room: Surfaces) -> np.ndarray:
+    """Reflectance of the surfaces [F, N]: a wall of red paint, a floor of wood, the others neutral."""
+    visible = np.zeros(int(room.surface.max()) + 1)
+    visible[room.surface] = room.reflectance
+    spectra = np.repeat(visible[:, None], len(NANOMETRES), axis=1)
+    spectra[4:6] = np.interp(NANOMETRES, [570.0, 620.0], [0.05, 0.7])  # the walls towards x = 4
+    spectra[12:14] = np.interp(NANOMETRES, [380.0, 780.0], [0.08, 0.5])  # the floor
+    return spectra
+
+
+def test_bands_of_reflectance_interpolate_the_light_of_a_room(corner) -> None:
+    # The light of a sphere of these surfaces after any number of reflections is known
+    room, channels = corner[0], channels_of(81)
+    visible, reflectance, area = _by_surface(room, coloured(room), channels)
+    bands = reflectance_bands(visible, reflectance, area, channels)
+    assert len(bands.reflectance) < 10
+
+    def light(values: np.ndarray) -> np.ndarray:
+        mean = area @ values / area.sum()
+        return 1 + 0.3 * values[5] + mean / (1 - mean)
+
+    whole = light(reflectance)
+    response = channels.detection / channels.detection.max(axis=1, keepdims=True)
+    missed = np.abs(bands.shares @ light(bands.reflectance.T) / whole - 1)
+    assert (missed * response).max() < 2e-3
+    assert np.abs(light(visible) / whole - 1).max() > 0.2
+    neutral = np.repeat(visible[:, None], channels.count, axis=1)
+    assert len(reflectance_bands(visible, neutral, area, channels).reflectance) == 1
+
+
+@pytest.mark.parametrize("open_site", [True, False])
+def test_light_of_a_coloured_room_is_that_traced_for_each_channel(corner, open_site: bool) -> None:
+    room, groups, shade, points = corner
+    exterior, channels = Surfaces.none() if open_site else shade, channels_of(9)
+    whole, spectra = sky(), coloured(room)
+    system = [[optics(np.full(len(ANGLES), 0.7))]] * len(groups)
+
+    def light(reflectance: np.ndarray):
+        interior = replace(room, reflectance=reflectance[room.surface])
+        matrices = traced(interior, exterior, groups, points, subdivision=1, window_parts=1)
+        return phase_light(matrices, system, whole)
+
+    visible = illuminant("D65") * sensitivities()[0]
+    neutral = [[SpectralFactor.neutral()]] * len(groups)
+    of_visible = light(spectra @ visible / visible.sum())
+    wanted = [Detection(np.eye(channels.count))]
+    found, grey = (
+        spectral_light(of_visible, neutral, channels, wanted, reflectance=colour).received[0]
+        for colour in (spectra, None)
+    )
+    means = channels.mean(spectra)
+    for c in range(channels.count):
+        one = light(means[:, c])
+        true = spectral_light(one, neutral, channels, [Detection(np.eye(channels.count)[[c]])]).received[0][0]
+        # 0.2, 0.2 and 1.1 %: standard deviation of the sensors over seeds, most of it shared
+        for s, sigma in enumerate((0.002, 0.002, 0.011)):
+            assert found[c][s] == pytest.approx(true[s], rel=4 * sigma), (c, s)
+    assert np.abs(found / grey - 1).max() > 0.1
+
+
+def test_windows_mirror_the_light_of_a_room_by_wavelength(corner) -> None:
+    room, groups, _, points = corner
+    channels, whole = channels_of(9), sky()
+    mirrored = np.interp(NANOMETRES, [480.0, 600.0], [0.02, 0.6])  # red seen from the room
+    weight = illuminant("D65") * sensitivities()[0]
+    visible = float(mirrored @ weight / weight.sum())
+    matrices = traced(room, Surfaces.none(), groups, points, subdivision=1, window_parts=1)
+    neutral = SpectralFactor.neutral()
+    red = replace(neutral, mirrored=mirrored)
+
+    def light(share: float):
+        return phase_light(matrices, [[optics(np.full(len(ANGLES), 0.4), share)]] * len(groups), whole)
+
+    found, grey = (channel_irradiance(light(visible), [[one]] * len(groups), channels) for one in (red, neutral))
+    for c, share in enumerate(channels.mean(mirrored)):
+        true = channel_irradiance(light(share), [[neutral]] * len(groups), channels)[c]
+        assert found[c] == pytest.approx(true, rel=3e-3), c  # bands leave out 1e-3 of each reflection
+    assert np.abs(found / grey - 1).max() > 0.01

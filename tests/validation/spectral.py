@@ -1,4 +1,4 @@
-"""Light by wavelength against Radiance: melanopic EDI, DER and CCT in three rooms."""
+"""Light by wavelength against Radiance: melanopic EDI, DER and CCT behind several windows, in two rooms."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.methods.spectral_light import Detection, spectral_light
 from mitsuba_cfs.sky.annual import AnnualSky, given_sky
-from mitsuba_cfs.spectra.channels import channels_of
+from mitsuba_cfs.spectra.channels import Channels
 from mitsuba_cfs.spectra.daylight import OVERCAST_K, daylight_components, daylight_shares, sun_spectra
 from mitsuba_cfs.spectra.detectors import (
     NANOMETRES,
@@ -37,7 +37,7 @@ from mitsuba_cfs.spectra.detectors import (
     sensitivities,
 )
 from mitsuba_cfs.surfaces import Surfaces
-from tests.radiance import polygon, run, write_surfaces
+from tests.radiance import polygon, run
 
 FABRIC = np.interp(NANOMETRES, [380, 500, 540, 780], [0.05, 0.05, 0.4, 0.4])  # amber
 WINDOWS = {  # panes of the IGSDB in ../shared/data, from outside to inside, and a fabric indoors
@@ -53,9 +53,20 @@ SKY_AND_GROUND = (
     "skyfunc glow ground_glow 0 0 4 1 1 1 0 ground_glow source ground 0 0 4 0 0 -1 180\n"
 )
 ALTITUDE, AZIMUTH = 35.0, 170.0  # of the sun [degrees], from north by east
-BANDS = 20  # of the peer, 380 to 780 nm; its build has at most 24
+BANDS = 20  # of each run of the peer, whose build has at most 24
+RANGES = 4  # of 100 nm each, a run of the peer for each
+VISIBLE = illuminant("D65") * sensitivities()[0]
+# Diffuse reflectances of the room's faces that are not neutral
+ROOMS: dict[str, dict[str, NDArray[np.float64]]] = {
+    "neutral": {},
+    "red wall, wooden floor": {
+        "left": np.interp(NANOMETRES, [570.0, 620.0], [0.05, 0.7]),
+        "floor": np.interp(NANOMETRES, [380.0, 780.0], [0.08, 0.5]),
+    },
+}
 POINTS = np.array([[2.0, 3.0, 0.8], [2.0, 3.0, 1.2], [2.0, 3.0, 1.2]])
 NORMALS = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+EVERY_5_NM = Channels(tuple(np.arange(380.0, 781.0, 5.0).tolist()))  # as the peer's
 NAMES = ("desk", "eye towards the window", "eye along the window")
 
 
@@ -94,8 +105,9 @@ def main(
     bounces: int = 8,
     divisions: int = 20000,
     only: str = "",
+    room: str = "neutral",
 ) -> str:
-    """The table of docs/evidence_daylight.md; only: of one of `WINDOWS`."""
+    """The tables of docs/evidence_daylight.md; only: of one of `WINDOWS`; room: one of `ROOMS`."""
     rows = [
         "| panes | sky | point | EDI [lx] | Radiance | difference % | DER | difference % | CCT, difference [K] |",
         "|---|---|---|---|---|---|---|---|---|",
@@ -105,7 +117,7 @@ def main(
             continue
         window = Window([read_spectral_pane(data / file) for file in files], fabric)
         for sky in ("overcast", "sun"):
-            own, peer = ours(window, sky), radiances(window, sky, bounces, divisions)
+            own, peer = ours(window, sky, room), radiances(window, sky, bounces, divisions, room)
             for s, point in enumerate(NAMES):
                 edi, ratio = own.edi[s], own.ratio[s]
                 rows.append(
@@ -117,13 +129,18 @@ def main(
     return "\n".join(rows)
 
 
-def room_scene() -> DaylightScene:
-    """A box of 4 x 6 x 3 m with a window to the south; its eye is the last of the points."""
-    space = shoebox().spaces[0]
+def room_scene(room: str = "neutral") -> tuple[DaylightScene, NDArray[np.float64]]:
+    """A box of 4 x 6 x 3 m with a window to the south, and the reflectance of its surfaces [F, N].
+
+    The eye of the scene is the last of the points.
+    """
+    colours = ROOMS[room]
+    visible = {side: float(spectrum @ VISIBLE / VISIBLE.sum()) for side, spectrum in colours.items()}
+    space = shoebox(reflectance=visible).spaces[0]
+    spectra = [colours.get(face.name, np.full(len(NANOMETRES), face.reflectance("visible"))) for face in space.faces]
     view = fisheye(tuple(POINTS[-1]), tuple(NORMALS[-1]), 16)
-    return DaylightScene(
-        interior_surfaces(space, "visible"), Surfaces.none(), window_groups(space), POINTS[:-1], NORMALS[:-1], view
-    )
+    interior, groups = interior_surfaces(space, "visible"), window_groups(space)
+    return DaylightScene(interior, Surfaces.none(), groups, POINTS[:-1], NORMALS[:-1], view), np.array(spectra)
 
 
 def hour(kind: str) -> AnnualSky:
@@ -135,41 +152,42 @@ def hour(kind: str) -> AnnualSky:
     return replace(sky, whole=sky.sun_alone()) if kind == "sun" else sky
 
 
-def ours(window: Window, kind: str) -> Light:
+def ours(window: Window, kind: str, room: str) -> Light:
     """The project's own, from the photopic light of the window's visible band."""
-    return received(photopic_light(window, hour(kind)), window, BANDS)
+    scene, reflectance = room_scene(room)
+    light = photopic_light(window, hour(kind), scene)
+    return received(light, window, EVERY_5_NM, reflectance)
 
 
-def received(light: PhaseLight, window: Window, bands: int) -> Light:
-    """The light of the points by so many bands."""
-    channels = channels_of(bands)
+def received(light: PhaseLight, window: Window, channels: Channels, reflectance: NDArray[np.float64]) -> Light:
+    """The light of the points by some bands."""
     wanted = [Detection(channels.detection)]
-    [values] = spectral_light(light, [[window.factor]], channels, wanted).received
+    [values] = spectral_light(light, [[window.factor]], channels, wanted, reflectance=reflectance).received
     return Light.of(values[..., 0].T)
 
 
-def photopic_light(window: Window, sky: AnnualSky) -> PhaseLight:
+def photopic_light(window: Window, sky: AnnualSky, scene: DaylightScene) -> PhaseLight:
     """The photopic light of the points in an hour."""
     table = spectral_tables(window.panes)["Visible"]
     system = BsdfOptics(specular_matrices(table), angular=table)
     if window.fabric is not None:
-        weight = illuminant("D65") * sensitivities()[0]
-        share = float(window.fabric @ weight / weight.sum())
+        share = float(window.fabric @ VISIBLE / VISIBLE.sum())
         block = np.full((KLEMS_FULL.size,) * 2, share / np.pi)
         sheet = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, block, block, block, block)
         system = BsdfOptics(combine_layers([specular_matrices(table), sheet]).bsdf)
     sampling = Sampling(sensor_samples=1 << 16, patch_samples=1 << 14, sun_points=1 << 13)
-    light = daylight(room_scene(), [[system]], sky, sampling=sampling)
+    light = daylight(scene, [[system]], sky, sampling=sampling)
     assert isinstance(light, PhaseLight)
     return light
 
 
-def radiances(window: Window, kind: str, bounces: int, divisions: int) -> Light:
+def radiances(window: Window, kind: str, bounces: int, divisions: int, room: str) -> Light:
     """Radiance's: spectra as its own primitives, each pane a `glass`, the fabric a `trans`."""
-    scene = room_scene()
+    scene, reflectance = room_scene(room)
+    power = []  # in the bands of the ranges, from blue to red
     with TemporaryDirectory() as name:
         folder = Path(name)
-        write_surfaces(scene.interior, folder / "room.rad")
+        (folder / "room.rad").write_text(_surfaces(scene.interior, reflectance), "utf-8")
         (folder / "pane.cal").write_text(PANE_CAL, "utf-8")
         (folder / "glass.rad").write_text(_glass(scene, window), "utf-8")
         azimuth = AZIMUTH - 180.0  # gendaylit's: west of south
@@ -179,14 +197,27 @@ def radiances(window: Window, kind: str, bounces: int, divisions: int) -> Light:
         run("oconv sky.rad room.rad glass.rad > scene.oct", folder)
         lines = "".join(" ".join(f"{v:g}" for v in (*p, *n)) + "\n" for p, n in zip(POINTS, NORMALS, strict=True))
         options = f"-I+ -h -ab {bounces} -aa 0 -ad {divisions} -as 0 -lw 1e-7 -dj 0 -dc 1 -dt 0 -cs {BANDS} -co+"
-        text = run(f"rtrace {options} scene.oct", folder, lines.encode()).decode()
-    values = np.array([[float(v) for v in line.split()] for line in text.splitlines()])
-    if values[0].size != BANDS:
-        raise ValueError(f"rtrace gave {values[0].size} values a point")
+        for low in np.linspace(380.0, 780.0, RANGES, endpoint=False):
+            command = f"rtrace {options} -cw {low:g} {low + 400 / RANGES:g} scene.oct"
+            text = run(command, folder, lines.encode()).decode()
+            values = np.array([[float(v) for v in line.split()] for line in text.splitlines()])
+            if values[0].size != BANDS:
+                raise ValueError(f"rtrace gave {values[0].size} values a point")
+            power.append(values[:, ::-1] * 400.0 / RANGES / BANDS)
     # a spectrum of 1 has 179 lm/W in Radiance
     flat = detected(np.ones(len(NANOMETRES)))[0]
-    power = values[:, ::-1] * 400.0 / BANDS  # from red to blue
-    return Light.of(power @ channels_of(BANDS).detection.T * 179.0 / flat)
+    return Light.of(np.concatenate(power, axis=1) @ EVERY_5_NM.detection.T * 179.0 / flat)
+
+
+def _surfaces(surfaces: Surfaces, reflectance: NDArray[np.float64]) -> str:
+    """Triangles as `plastic` of the spectra of their surfaces [F, N]."""
+    parts = [
+        f"{_spectrum(f'colour{f}', spectrum)}\ncolour{f} plastic surface{f}\n0\n0\n5 1 1 1 0 0\n"
+        for f, spectrum in enumerate(reflectance)
+    ]
+    for i, (f, triangle) in enumerate(zip(surfaces.surface, surfaces.triangles, strict=True)):
+        parts.append(polygon(f"surface{f}", f"triangle{i}", triangle))
+    return "\n".join(parts)
 
 
 def transmissivity(tau: ArrayLike) -> NDArray[np.float64]:

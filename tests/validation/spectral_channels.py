@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.spectral_pane import read_spectral_pane
-from mitsuba_cfs.spectra.channels import CHANNEL_SETS
-from tests.validation.spectral import WINDOWS, Light, Window, hour, photopic_light, received
+from mitsuba_cfs.spectra.channels import CHANNEL_SETS, channels_of
+from tests.validation.spectral import WINDOWS, Light, Window, hour, photopic_light, received, room_scene
 
 EVERY_5_NM = max(CHANNEL_SETS)
 SKIES = ("overcast", "clear", "sun")
@@ -18,13 +18,14 @@ SKIES = ("overcast", "clear", "sun")
 def main(*, data: Path = Path("../shared/data/bsdf/products_spectral")) -> str:
     """The table of docs/spectral.md: largest errors of three points under three skies."""
     rows = ["| window | bands | melanopic EDI % | DER % | CCT [K] |", "|---|---|---|---|---|"]
+    scene, reflectance = room_scene()
     for name, (files, fabric) in WINDOWS.items():
         window = Window([read_spectral_pane(data / file) for file in files], fabric)
         found: dict[int, list[Light]] = {count: [] for count in CHANNEL_SETS}
         for sky in SKIES:
-            light = photopic_light(window, hour(sky))
+            light = photopic_light(window, hour(sky), scene)
             for count, of_skies in found.items():
-                of_skies.append(received(light, window, count))
+                of_skies.append(received(light, window, channels_of(count), reflectance))
         exact = found.pop(EVERY_5_NM)
         for count, own in found.items():
             edi = max(_most(a.edi / b.edi - 1) for a, b in zip(own, exact, strict=True))

@@ -17,10 +17,12 @@ WATER_CM = 5.0  # of the atmosphere there, the year's mean
 LOWEST_DEG = 5.0  # altitude of the sun below which measurements are left out
 
 
-def main(measured: Path) -> str:
-    """The table of docs/spectral.md.
+def main(measured: Path, *, clear: str = "cie") -> str:
+    """The tables of docs/spectral.md.
 
-    Args: measured: metadata.csv of github.com/prijibalakrishnan/equatorialskies.
+    Args:
+        measured: metadata.csv of github.com/prijibalakrishnan/equatorialskies.
+        clear: spectrum of a clear sky, one of `SKY_SPECTRA`.
     """
     table = pd.read_csv(measured).dropna(subset=["GlobalIrrad"])
     moments = pd.to_datetime(table["MonthYear"] + " " + table["Time"], format="%d%b%y %H:%M")
@@ -30,7 +32,7 @@ def main(measured: Path) -> str:
     table, times, position = table[high], times[high], position[high]
     split = pvlib.irradiance.erbs(table["GlobalIrrad"].to_numpy(), position["zenith"], times)
     sky = _sky(position, split, times)
-    own = detected(sky_spectra(sky, WATER_CM).horizontal)
+    own = detected(sky_spectra(sky, WATER_CM, clear).horizontal)
     kelvin, true = colour_temperature(own[:, -3:])[0], table["CCT"].to_numpy(dtype=float)
     lines = [
         "| sky | measurements | CCT measured, median [K] | model | difference, mean [1/MK] | rms |",

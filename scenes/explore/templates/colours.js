@@ -39,6 +39,33 @@
     return image(view, pixels, (i, out, at) => { out[at] = out[at + 1] = out[at + 2] = srgb(curve(values[i])); });
   }
 
+  const TINT_STEP = 0.001; // see scenes/explore/folder.py
+
+  // Red, green, blue and melanopic value of a pixel i: luminance of its parts times their tints
+  function coloured(found, tints, i, out) {
+    const { own, indoors, sky, sun } = tints, beam = found.ofBeam[i], window = found.ofWindow[i];
+    const rest = Math.max(found.values[i] - beam - window, 0);
+    for (let k = 0; k < 4; k++) out[k] = own[4 * i + k] * TINT_STEP * (rest * indoors[k] + window * sky[k] + beam * sun[k]);
+    return out;
+  }
+
+  // As the eye adapts to it: the tone-mapped luminance, in its colours
+  function trueColour(view, pixels, found, tints, curve) {
+    const rgb = new Float64Array(4);
+    return image(view, pixels, (i, out, at) => {
+      coloured(found, tints, i, rgb);
+      const luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2], scale = luminance > 0 ? curve(found.values[i]) / luminance : 0;
+      for (let k = 0; k < 3; k++) out[at + k] = srgb(Math.min(Math.max(scale * rgb[k], 0), 1));
+    });
+  }
+
+  // Melanopic equivalent daylight luminance of the pixels [cd/m2]
+  function melanopic(found, tints) {
+    const values = new Float32Array(found.values.length), four = new Float64Array(4);
+    for (let i = 0; i < values.length; i++) values[i] = coloured(found, tints, i, four)[3];
+    return values;
+  }
+
   function falseColour(view, pixels, values, palette, low, high) {
     const base = Math.log(low), span = Math.log(high / low);
     return image(view, pixels, (i, out, at) => {
@@ -79,5 +106,5 @@
     for (let i = 0; i <= 16; i++) { const at = shade(palette, i / 16); stops.push(`rgb(${palette[at]},${palette[at + 1]},${palette[at + 2]})`); }
     return `linear-gradient(90deg,${stops.join(",")})`;
   }
-  Object.assign(cfs, { shade, toneCurve, toneMapped, falseColour, difference, ratioColour, outlines, gradient, MOST_RATIO });
+  Object.assign(cfs, { shade, toneCurve, toneMapped, trueColour, melanopic, falseColour, difference, ratioColour, outlines, gradient, MOST_RATIO });
 })();

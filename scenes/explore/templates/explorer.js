@@ -29,6 +29,9 @@
       explorer.panels.push(new cfs.Panel(box, explorer.variants, i ? second : first, update));
     });
     byId("compare").disabled = count < 2;
+    const isColoured = data.rooms.some((room) => (room.melanopic || []).length);
+    for (const option of byId("colours").options) if (["true", "melanopic"].includes(option.value)) option.hidden = option.disabled = !isColoured;
+    byId("of-colours").hidden = !isColoured;
     hands(data);
     await update();
     document.body.dataset.ready = "yes";
@@ -152,7 +155,7 @@
 
   function paintScale() {
     const { colours, high, palette } = look(), box = byId("scale");
-    box.hidden = colours === "seen";
+    box.hidden = colours === "seen" || colours === "true";
     byId("bar").style.background = cfs.gradient(palette);
     byId("low-end").textContent = `${cfs.number(high / 1000, 2)} cd/m²`;
     byId("high-end").textContent = `${cfs.number(high, 2)} cd/m²`;

@@ -11,6 +11,8 @@
       this.isWindow = new Int32Array(view.row.length).fill(-1);
       model.window.forEach((pixel, i) => { this.isWindow[pixel] = i; });
       this.values = new Float32Array(view.row.length);
+      this.ofBeam = new Float32Array(view.row.length); // parts of the values: the sun's beam, what windows show
+      this.ofWindow = new Float32Array(view.row.length);
       this.files = new Map();
     }
 
@@ -62,11 +64,13 @@
     // Luminance [cd/m2] of the pixels in an hour (a number among the hours with the sun up)
     compute(hour, codes) {
       const rows = this.ofPart(this.parts[0], hour), windows = this.ofPart(this.parts[1], hour);
-      const { row, share } = this.view, { values } = this, n = values.length;
+      const { row, share } = this.view, { values, ofBeam, ofWindow } = this, n = values.length;
+      ofBeam.fill(0);
+      ofWindow.fill(0);
       for (let i = 0; i < n; i++) values[i] = rows[row[i]] * share[i];
       if (codes) {
         const { beam, beamCode, ratio, ratioCode } = codes, floor = this.model.floor[hour];
-        if (beam.length) for (let i = 0; i < n; i++) if (beamCode[i]) values[i] += beam[beamCode[i] - 1];
+        if (beam.length) for (let i = 0; i < n; i++) if (beamCode[i]) { ofBeam[i] = beam[beamCode[i] - 1]; values[i] += ofBeam[i]; }
         if (ratio.length) {
           for (let i = 0; i < windows.length; i++) {
             if (ratioCode[i]) windows[i] = Math.max(windows[i], floor) * ratio[ratioCode[i] - 1];
@@ -74,7 +78,7 @@
         }
       }
       const { window } = this.model;
-      for (let i = 0; i < window.length; i++) values[window[i]] += windows[i];
+      for (let i = 0; i < window.length; i++) { values[window[i]] += windows[i]; ofWindow[window[i]] = windows[i]; }
       return values;
     }
 
@@ -91,7 +95,7 @@
     async picture(hour) {
       const codes = await this.codes(hour), start = performance.now();
       const values = this.compute(hour, codes);
-      return { values, discs: this.discs(hour), milliseconds: performance.now() - start };
+      return { values, ofBeam: this.ofBeam, ofWindow: this.ofWindow, discs: this.discs(hour), milliseconds: performance.now() - start };
     }
   }
   cfs.PictureYear = PictureYear;

@@ -30,7 +30,14 @@
       const state = room.stateOf(variant.state, hour), l = room.number.get(hour);
       if (l === undefined) return { room, state, variant };
       const [rated, lux] = await Promise.all([room.rated(state, l), room.illuminance(state, l)]);
-      return { room, state, variant, l, lux, ...rated, values: rated.values.slice(), labels: rated.glare.labels.slice() };
+      const found = { room, state, variant, l, lux, ...rated, labels: rated.glare.labels.slice() };
+      for (const name of ["values", "ofBeam", "ofWindow"]) found[name] = rated[name].slice();
+      if (room.coloured) {
+        found.tints = room.tints(state, l);
+        found.melanopic = await room.illuminance(state, l, true);
+        found.melanopicEye = room.arrays.melanopic_eye[state * room.L + l];
+      }
+      return found;
     }
 
     // look: {colours, high, outline, planes, palette}; curve: shared by the panels side by side
@@ -41,9 +48,12 @@
       canvas.height = view.height;
       if (found.l !== undefined) {
         const { pixels } = room.arrays;
-        const picture = look.colours === "seen"
-          ? cfs.toneMapped(view, pixels, found.values, curve)
-          : cfs.falseColour(view, pixels, found.values, look.palette, look.high / 1000, look.high);
+        const inFalse = (values) => cfs.falseColour(view, pixels, values, look.palette, look.high / 1000, look.high);
+        let picture;
+        if (look.colours === "seen") picture = cfs.toneMapped(view, pixels, found.values, curve);
+        else if (look.colours === "true" && found.tints) picture = cfs.trueColour(view, pixels, found, found.tints, curve);
+        else if (look.colours === "melanopic" && found.tints) picture = inFalse(cfs.melanopic(found, found.tints));
+        else picture = inFalse(found.values);
         if (look.outline) cfs.outlines(picture, found.labels);
         pen.putImageData(picture, 0, 0);
       }
@@ -52,7 +62,9 @@
       if (!this.drawing || this.drawing.plan !== room.plan) this.drawing = new cfs.Plan(this.at("plan"), room.plan, look.palette);
       const shining = found.l !== undefined && sun[2] > 0.01 && room.arrays.sun_lux[found.l] > 0;
       const beams = shining ? room.beams(state, found.l) : [];
-      this.drawing.paint(found.lux || null, shining ? { direction: sun, groups: beams, planes: look.planes } : null);
+      this.asMelanopic = look.colours === "melanopic" && Boolean(found.melanopic);
+      this.at("quantity").textContent = this.asMelanopic ? gettext("Melanopic EDI of the work plane") : gettext("Illuminance of the work plane");
+      this.drawing.paint((this.asMelanopic ? found.melanopic : found.lux) || null, shining ? { direction: sun, groups: beams, planes: look.planes } : null);
       this.sayLight(found, beams, sun);
       this.sayHeat(room, hour, day);
     }
@@ -70,11 +82,12 @@
       }
       dgp.classList.add(cfs.glareClass(glare.dgp));
       set("dgp", `DGP ${fixed(glare.dgp, 3)} ${cfs.glareWords(glare.dgp)}`);
-      const n = glare.sources.length;
+      const n = glare.sources.length, { melanopicEye } = found;
       const facts = [
         gettext("{lux} lx at the eye", { lux: cfs.number(glare.Ev) }),
         n ? ngettext("{count} glare source", "{count} glare sources", n) : gettext("no glare source"),
       ];
+      if (melanopicEye !== undefined) facts.push(gettext("{lux} lx melanopic EDI at the eye", { lux: cfs.number(melanopicEye) }));
       if (glare.sources.some((s) => s.sun)) facts.push(gettext("solar disc in view"));
       facts.push(gettext("up to {value} cd/m²", { value: cfs.number(glare.largest, 2) }));
       set("figures", facts.join(", "));

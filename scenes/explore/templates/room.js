@@ -19,6 +19,7 @@
       this.plan = { ...this.facts.plan, blockers };
       this.states = [];
       this.lux = [];
+      this.mel = [];
     }
 
     // The fisheye of the view and a scan of it, made when first needed
@@ -39,10 +40,21 @@
       return this.states[state];
     }
 
-    // Illuminance [S] of the sensors in a lit hour [lx]
-    async illuminance(state, l) {
-      this.lux[state] ||= cfs.load(this.luxFiles[state]).then(cfs.arrayOf);
-      const codes = await this.lux[state], count = codes.length / this.L, found = new Float32Array(count);
+    // Whether the run was by wavelength
+    get coloured() { return Boolean(this.arrays.tint); }
+
+    // Tints [4] of a pixel's parts in a lit hour: red, green and blue over luminance, melanopic DER
+    tints(state, l) {
+      const { tint, tint_indoors, tint_sky, tint_sun, pixels } = this.arrays, hour = 4 * (state * this.L + l);
+      const own = tint.subarray(4 * state * pixels.length, 4 * (state + 1) * pixels.length);
+      return { own, indoors: tint_indoors.subarray(hour, hour + 4), sky: tint_sky.subarray(4 * l, 4 * l + 4), sun: tint_sun.subarray(hour, hour + 4) };
+    }
+
+    // Illuminance [S] of the sensors in a lit hour [lx], or melanopic EDI
+    async illuminance(state, l, melanopic = false) {
+      const files = melanopic ? this.entry.melanopic : this.luxFiles, known = melanopic ? this.mel : this.lux;
+      known[state] ||= cfs.load(files[state]).then(cfs.arrayOf);
+      const codes = await known[state], count = codes.length / this.L, found = new Float32Array(count);
       for (let s = 0; s < count; s++) found[s] = Math.expm1(codes[s * this.L + l] * LUX_STEP);
       return found;
     }
