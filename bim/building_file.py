@@ -32,7 +32,7 @@ from bim.model import Building, Construction, Element, Face, Georeference, Mater
 from bim.names import AmbiguousName, UnknownName, has_words, unknown_room
 from bim.report.issue import Effect, Issue, Phrase, issue_text
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import sha256
+from mitsuba_cfs.files import read_json, sha256
 from mitsuba_cfs.gloss import Gloss
 from mitsuba_cfs.matrices.cache import CacheEntry, MatrixCache
 from mitsuba_cfs.processes import ended_processes
@@ -469,12 +469,6 @@ def _read_radiance(path: Path, options: ReadOptions, progress: Progress) -> Buil
     return read_radiance_building(path, options.apertures, options.facade_panes)
 
 
-def _check_honeybee(path: Path) -> None:
-    from bim.honeybee.schema import read_json
-
-    read_json(path)
-
-
 def _read_honeybee(path: Path, options: ReadOptions, progress: Progress) -> Building:
     from bim.honeybee.building import read_honeybee
 
@@ -515,7 +509,7 @@ MARKS = (  # in the first bytes of a file of any suffix
 )
 IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join", "linked", "storeys"))
 RADIANCE = BuildingFormat("Radiance", (".rad",), _check_there, _read_radiance, ("apertures", "facade_panes"))
-HONEYBEE = BuildingFormat("honeybee", (".hbjson",), _check_honeybee, _read_honeybee, ("join",))
+HONEYBEE = BuildingFormat("honeybee", (".hbjson",), read_json, _read_honeybee, ("join",))
 GBXML = BuildingFormat("gbXML", (".gbxml", ".xml"), _check_gbxml, _read_gbxml, ("join",))
 FORMATS: tuple[BuildingFormat, ...] = (IFC, RADIANCE, HONEYBEE, GBXML)
 

@@ -180,6 +180,29 @@ def write_text(path: str | PathLike[str], text: str, *, encoding: str = "utf-8")
         part.write_text(text, encoding=encoding)
 
 
+def read_json(path: Path, *, most_bytes: int = 256 << 20) -> dict[str, Any]:
+    """The object that a JSON file holds; memory is up to ten times its size.
+
+    Raises: `DataError` for a file that cannot be read, is too big or is no JSON object.
+    """
+    try:
+        if path.stat().st_size > most_bytes:
+            raise DataError(f"is too big: at most {most_bytes >> 20} MiB are read", file=path)
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
+    except RecursionError:
+        raise DataError("is no JSON: nested too deeply", file=path) from None
+    except ValueError as error:  # of JSON, of its text, of a number with too many digits
+        if isinstance(error, DataError):
+            raise
+        message = wrong_encoding(path.read_bytes()) or f"is no JSON: {error}"
+        raise DataError(message, file=path) from None
+    if not isinstance(content, dict):
+        raise DataError("expected a JSON object", file=path)
+    return content
+
+
 def json_text(value: object, **options: Any) -> str:
     """A value as JSON: NaN, which is no value, is null; options of `json.dumps`.
 

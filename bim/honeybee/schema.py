@@ -9,7 +9,6 @@ Source: honeybee-schema, "Model" (https://www.ladybug.tools/honeybee-schema/mode
 
 from __future__ import annotations
 
-import json
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -19,9 +18,8 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, Field, ValidationError
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import reason, wrong_encoding
+from mitsuba_cfs.files import read_json
 
-MOST_BYTES = 256 << 20  # of a file: memory is ten times as much
 METRES = {"Meters": 1.0, "Millimeters": 1e-3, "Centimeters": 0.01, "Feet": 0.3048, "Inches": 0.0254}
 Coordinate = Annotated[float, Field(allow_inf_nan=False, ge=-1e9, le=1e9)]
 Point = tuple[Coordinate, Coordinate, Coordinate]
@@ -151,27 +149,6 @@ class HoneybeeModel(HoneybeeObject):
     def scale(self) -> float:
         """Metres in a unit of length."""
         return METRES[self.units]
-
-
-def read_json(path: Path) -> dict[str, Any]:
-    """The object that a JSON file holds.
-
-    Raises: `DataError` for a file that cannot be read, is too big or is no JSON object.
-    """
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise DataError(f"is too big: at most {MOST_BYTES >> 20} MiB are read", file=path)
-        content = json.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise DataError(f"cannot be read: {reason(error)}", file=path) from None
-    except RecursionError:
-        raise DataError("is no JSON: nested too deeply", file=path) from None
-    except ValueError as error:  # of JSON, of its text, of a number with too many digits
-        message = wrong_encoding(path.read_bytes()) or f"is no JSON: {error}"
-        raise DataError(message, file=path) from None
-    if not isinstance(content, dict):
-        raise DataError("expected a JSON object", file=path)
-    return content
 
 
 def read_model(path: Path) -> HoneybeeModel:

@@ -57,10 +57,10 @@ from bim.surroundings.objects import (
     are_coordinates,
     is_number,
     read_bytes,
-    read_object,
 )
 from bim.xml_elements import xml_elements
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import read_json
 
 # Middles of the ranges of Konarska et al. 2014, doi:10.1007/s00704-013-1000-3, five deciduous
 # species in Gothenburg: 1.3 to 5.3 % with leaves, 40.2 to 51.9 % without
@@ -175,7 +175,7 @@ def read_footprints(path: Path) -> SurroundingsFile:
 
     Raises: `DataError` that names file, feature and field; a file without any height.
     """
-    content = read_object(path)
+    content = read_json(path, most_bytes=MOST_BYTES)
     features = content.get("features")
     if content.get("type") != "FeatureCollection" or not isinstance(features, list):
         raise DataError("expected a FeatureCollection of GeoJSON", file=path, field="type")
@@ -500,7 +500,7 @@ def read_cityjson(path: Path) -> SurroundingsFile:
 
     Raises: `DataError` that names file, object and field.
     """
-    content = read_object(path)
+    content = read_json(path, most_bytes=MOST_BYTES)
     if content.get("type") != "CityJSON":
         kind = content.get("type")
         raise DataError(f"expected CityJSON, got {kind!r:.60}", file=path, field="type")

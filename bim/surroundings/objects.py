@@ -145,21 +145,6 @@ def read_bytes(path: Path) -> bytes:
         raise DataError(f"cannot be read: {reason(error)}", file=path) from None
 
 
-def read_object(path: Path) -> dict[str, Any]:
-    """The object that a JSON file holds; `DataError` where it is none."""
-    try:
-        content = json.loads(read_bytes(path))
-    except RecursionError:
-        raise DataError("is no JSON: nested too deeply", file=path) from None
-    except ValueError as error:
-        if isinstance(error, DataError):
-            raise
-        raise DataError(f"is no JSON: {error}", file=path) from None
-    if not isinstance(content, dict):
-        raise DataError("expected a JSON object", file=path)
-    return content
-
-
 def is_number(value: object) -> bool:
     """Whether a JSON value is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < FARTHEST

@@ -53,10 +53,9 @@ from bim.surroundings.objects import (
     are_coordinates,
     read_bytes,
     read_meshes,
-    read_object,
 )
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import reason
+from mitsuba_cfs.files import read_json, reason
 from mitsuba_cfs.surfaces import even_numbers
 
 # Leaves of broadleaf deciduous trees, visible 0.10 and near infrared 0.45: Oleson et al. 2013,
@@ -210,7 +209,7 @@ def read_horizon(path: Path) -> NDArray[np.float64]:
 
 
 def _json_rows(path: Path) -> list[tuple[str, str]]:
-    content = read_object(path)
+    content = read_json(path)
     try:
         rows = content["outputs"]["horizon_profile"]
         return [(row["A"], row["H_hor"]) for row in rows]

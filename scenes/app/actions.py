@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from bim.ifc.corrections import corrections_file
 from mitsuba_cfs.errors import DataError
 from scenes.app.project import INPUTS, RESULTS, STUDY, USES, Project, slug
 from scenes.language.catalogue import gettext
@@ -119,6 +120,51 @@ def result_titles(study: Mapping[str, Any]) -> dict[str, str]:
     systems = study.get("system", [])
     named = list(zip(systems, _folders(systems), strict=True))
     return {f"{kind}-{name}": one["name"] for kind in ("report", "rules") for one, name in named}
+
+
+def outdated(project: Project, name: str, journal: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    """What has changed since a folder of results was made: input files, "choices" of the page.
+
+    Args:
+        name: the folder in `results`.
+        journal: the lines of `Project.journal`; results of a command that is not in it are none of ours.
+    """
+    out = f"{RESULTS}/{name}"
+    made = (one for one in reversed(journal) if one.get("state") == "done" and out in one["command"])
+    line = next(made, None)
+    if line is None:
+        return ()
+    command = [str(part) for part in line["command"]]
+    after = [*command[1:], ""]
+    wanted = {
+        "report": True,
+        "annual_glare": "--annual-glare" in command,
+        "explore": "--explore" in command,
+        "compare": True,
+        "standards": [after[i] for i, part in enumerate(command) if part == "--standard"],
+        "language": next((after[i] for i, part in enumerate(command) if part == "--language"), "en"),
+    }
+    try:
+        planned = {one.out: ["cfs", *one.command] for one in computations(project, wanted)}
+    except DataError:
+        planned = {}
+    changed = [Path(one).name for one in _read_by(project, command) if _newer(project.folder / one, line)]
+    return (*dict.fromkeys(changed), *(["choices"] if planned.get(out) != command else []))
+
+
+def _read_by(project: Project, command: Sequence[str]) -> list[str]:
+    """The files that a command reads, relative to the project."""
+    files = [part for part in command if not part.startswith("-") and (project.folder / part).is_file()]
+    if STUDY in files:
+        files += [one.path for one in project.files()]
+    files += [state for one in files if one.endswith(".toml") and one != STUDY for state in project.states(one)]
+    beside = [corrections_file(Path(one)).as_posix() for one in files if one.lower().endswith(".ifc")]
+    return [*files, *(one for one in beside if (project.folder / one).is_file())]
+
+
+def _newer(path: Path, line: Mapping[str, Any]) -> bool:
+    """Whether a file was written after a command began, whose time is rounded to seconds."""
+    return path.is_file() and path.stat().st_mtime > float(line.get("started", 0)) + 1
 
 
 def export(project: Project, form: str) -> Action:

@@ -16,13 +16,16 @@ import json
 import re
 import threading
 import unicodedata
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
+
+import tomlkit
+from tomlkit.items import AoT, Table
 
 from bim.building_file import check_building_file
 from bim.ifc.corrections import corrections_file, read_corrections
@@ -109,46 +112,53 @@ def _root(path: Path) -> str:
     return ""
 
 
-def toml_text(table: Mapping[str, Any]) -> str:
-    """A table as TOML: plain keys first, then tables, then lists of tables."""
-    return "\n".join(_lines(table, ())).strip() + "\n"
+def toml_text(table: Mapping[str, Any], before: str = "") -> str:
+    """A table as TOML; comments and the order of an earlier text stay."""
+    document = tomlkit.parse(before)
+    _fill(document, table)
+    return tomlkit.dumps(document)
 
 
-def _lines(table: Mapping[str, Any], place: tuple[str, ...]) -> list[str]:
-    tables = {key: value for key, value in table.items() if isinstance(value, dict)}
-    lists = {
-        key: value
-        for key, value in table.items()
-        if isinstance(value, list) and value and all(isinstance(one, dict) for one in value)
-    }
-    lines = [
-        f"{_key(key)} = {_value(value)}"
-        for key, value in table.items()
-        if key not in tables and key not in lists and value is not None
-    ]
-    for key, value in tables.items():
-        lines += ["", f"[{'.'.join(map(_key, (*place, key)))}]", *_lines(value, (*place, key))]
-    for key, entries in lists.items():
-        for entry in entries:
-            lines += ["", f"[[{'.'.join(map(_key, (*place, key)))}]]"]
-            lines += _lines(entry, (*place, key))
-    return lines
+def write_table(path: Path, table: Mapping[str, Any], *, head: str = "") -> None:
+    """Write a TOML file, with the comments that it has; a new one begins with the head."""
+    before = path.read_text(encoding="utf-8") if path.is_file() else head
+    write_text(path, toml_text(table, before))
 
 
-def _key(name: str) -> str:
-    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _value(name)
+def _fill(into: MutableMapping[str, Any], table: Mapping[str, Any]) -> None:
+    """Make a document's table equal to another one; entries without a value are left out."""
+    wanted = {key: value for key, value in table.items() if value is not None}
+    for key in [one for one in into if one not in wanted]:
+        del into[key]
+    after: list[Any] = []  # a comment below the last entry is of what follows
+    if isinstance(into, Table):
+        body = into.value.body
+        while body and body[-1][0] is None:
+            after.insert(0, body.pop())
+    for key, value in wanted.items():
+        old = into.get(key)
+        if isinstance(value, dict) and isinstance(old, MutableMapping):
+            _fill(old, value)
+        elif repr(tomlkit.item(old).unwrap() if old is not None else None) != repr(value):
+            into[key] = _entries(old, value) if _is_tables(value) else value
+    if isinstance(into, Table):
+        into.value.body.extend(after)
 
 
-def _value(value: Any) -> str:
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(_value, value)) + "]"
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + "}"
-    if isinstance(value, float):
-        return repr(value)  # inf and nan too
-    if isinstance(value, str | bool | int):
-        return json_text(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return str(value)  # a date
+def _is_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(one, dict) for one in value)
+
+
+def _entries(old: Any, tables: Sequence[Mapping[str, Any]]) -> AoT:
+    """Tables as entries of a document; each is an earlier one of the same name, where there is one."""
+    known = {one.get("name"): one for one in old} if isinstance(old, AoT) else {}
+    entries = tomlkit.aot()
+    for table in tables:
+        entry = known.pop(table.get("name"), None)
+        entry = tomlkit.table() if entry is None else entry
+        _fill(entry, table)
+        entries.append(entry)
+    return entries
 
 
 def _alone(method: Callable[..., Any]) -> Callable[..., Any]:
@@ -264,7 +274,7 @@ class Project:
     def write_study(self, study: Mapping[str, Any]) -> None:
         """Write the study file, empty lists left out."""
         kept = {key: value for key, value in study.items() if value not in ([], {}, None, "")}
-        write_text(self.folder / STUDY, toml_text(kept))
+        write_table(self.folder / STUDY, kept)
 
     @staticmethod
     def _building(study: Mapping[str, Any]) -> list[str]:
@@ -356,7 +366,7 @@ class Project:
             operation[table] = rest | entries
         operation = {key: one for key, one in operation.items() if one != {}}
         if operation:
-            write_text(self.folder / OPERATION, WRITTEN + toml_text(operation))
+            write_table(self.folder / OPERATION, operation, head=WRITTEN)
             study["operation"] = OPERATION
         else:
             (self.folder / OPERATION).unlink(missing_ok=True)
@@ -365,7 +375,7 @@ class Project:
             path = self.folder / one.get("operation", "")
             if path.parent == self.folder / INPUTS and path.name.startswith(OPERATED):
                 kept = {k: v for k, v in read_table(path).items() if k not in ("loads", "gains")}
-                write_text(path, WRITTEN + toml_text(kept | operation))
+                write_table(path, kept | operation, head=WRITTEN)
 
     def _change_uses(self, _study: dict[str, Any], value: Any) -> None:
         """Uses of rooms by GUID; an empty text takes the file's."""
@@ -378,7 +388,7 @@ class Project:
             rooms[guid] = _text(use, "uses") if use else ""
         table["rooms"] = {guid: use for guid, use in rooms.items() if use}
         if table["rooms"] or len(table) > 1:
-            write_text(path, toml_text(table))
+            write_table(path, table)
         else:
             path.unlink(missing_ok=True)
 
@@ -401,7 +411,7 @@ class Project:
         if not table:
             path.unlink(missing_ok=True)
             return
-        write_text(path, toml_text(table))
+        write_table(path, table)
         try:
             read_corrections(path)
         except DataError:
@@ -439,7 +449,7 @@ class Project:
             path = self.folder / INPUTS / f"{OPERATED}{Path(made.files[-1]).stem}.toml"
             states = [{"bsdf": Path(one).relative_to(INPUTS).as_posix()} for one in made.files]
             table = {"system": states, "control": {"rule": "glare"}} | self.operation()
-            write_text(path, WRITTEN + toml_text(table))
+            write_table(path, table, head=WRITTEN)
             file = path.relative_to(self.folder).as_posix()
             systems.append({"name": name, "operation": file})
         self.write_study(study)

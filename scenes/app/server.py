@@ -31,7 +31,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from mitsuba_cfs.errors import CfsError
-from mitsuba_cfs.files import json_text
+from mitsuba_cfs.files import json_text, read_json
 from scenes.app import actions
 from scenes.app.jobs import Jobs
 from scenes.app.project import GAINS, INPUTS, LOADS, RESULTS, MadeSystem, Project, plain_name
@@ -71,7 +71,7 @@ def variants(project: Project, language: str = "en") -> dict[str, Any] | None:
     shown = [key for key in FIGURES if any(case.get(key) for case in cases)]
     with in_language(language):
         named = [quantity(key) for key in shown]
-    record = json.loads((folder / "study.json").read_text(encoding="utf-8"))
+    record = read_json(folder / "study.json")
     return {
         "columns": [
             {
@@ -349,7 +349,9 @@ class AppServer:
         gains = operation.get("gains", {})
         systems = study.get("system", [])
         results, titles = self._project.results(), actions.result_titles(study)
+        journal = self._project.journal()
         for result in results:
+            result["outdated"] = actions.outdated(self._project, result["name"], journal)
             result["title"] = _result_title(result["name"], titles)
             pages = [result["pages"].get(name) for name in ("report", "dossier")]
             result["answers"] = [text for page in pages if page for text in answers(self._project.folder / page)]
@@ -373,7 +375,7 @@ class AppServer:
             "others": sum("building" not in one for one in study.get("room", [])),
             "results": results,
             "exported": self._project.exported(),
-            "journal": self._project.journal()[-50:],
+            "journal": journal[-50:],
         }
 
     async def _news(self, request: Request) -> Any:
@@ -389,7 +391,7 @@ class AppServer:
         path = self._project.folder / actions.CHECK
         if not path.is_file():
             return None
-        return await asyncio.to_thread(lambda: json.loads(path.read_text("utf-8")))
+        return await asyncio.to_thread(read_json, path)
 
     async def _rule_sets(self, _: Request) -> Any:
         if self._rules is None:

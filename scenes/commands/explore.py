@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 
 import click
 
-from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import reason, scratch_folder
+from mitsuba_cfs.files import read_json, scratch_folder
 from scenes.commands.served_page import port_fault, served_page_options
 
 RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
@@ -52,17 +50,13 @@ def _print_head(results: Path, *, several: bool) -> None:
     from scenes.head import record_lines
     from scenes.user_errors import one_line
 
-    try:
-        record = json.loads((results / "run.json").read_text(encoding="utf-8"))
-    except FileNotFoundError:  # an explorer that was copied without its run
+    file = results / "run.json"
+    if not file.exists():  # an explorer that was copied without its run
         return
-    except (OSError, ValueError, RecursionError) as error:
-        raise DataError(f"cannot be read: {reason(error)}", file=results / "run.json") from None
+    record = read_json(file)
     if several:
         click.echo(f"{results}:")
-    if not isinstance(record, dict):
-        raise DataError("is no record of a run", file=results / "run.json")
-    for line in record_lines(record["head"], results / "run.json") if "head" in record else ():
+    for line in record_lines(record["head"], file) if "head" in record else ():
         click.echo(one_line(line))
 
 

@@ -292,7 +292,7 @@ def _filled(result: Compliance, *, quick: bool, page: PageOptions) -> str:
             facts=summary(result) + page.facts,
             answers=[(title, tied(text)) for title, text in answers(result)],
             quick=gettext(NOTE) if quick else "",
-            notes=head_lines(result.head, (*([gettext(NOTE)] if quick else []), *result.notes)),
+            notes=head_lines(result.head, result.notes),
             assumptions=[translated(text) for text in result.assumptions],
             rules=[dossier_rule(result, name) for name in result.rules],
             rooms=rooms,

@@ -31,9 +31,12 @@ def project(tmp_path) -> Project:
 
 @pytest.fixture
 def jobs(project):
+    # As uvicorn does in `cfs app`: what a shell runs in the background ignores SIGINT, and so would the commands
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     one = Jobs(project)
     yield one
     one.close()
+    signal.signal(signal.SIGINT, before)
 
 
 def until(happened) -> None:
@@ -60,12 +63,18 @@ def test_a_command_reports_its_progress_and_leaves_its_results(project, jobs) ->
     assert log.read_text("utf-8").startswith("$ cfs check inputs/office.ifc")
 
 
-def test_stop_and_resume(project, jobs) -> None:
+def test_stop_and_resume(project, jobs, monkeypatch) -> None:
     blind = actions.library("double clear", "venetian 25 mm inside, 45 deg")  # traced for seconds
+    take = jobs._take
+
+    def stop_at_first_progress(job, line, log) -> None:
+        take(job, line, log)
+        if job.number == 1 and job.progress and job.code is None:
+            jobs.stop(2)
+            jobs.stop(1)
+
+    monkeypatch.setattr(jobs, "_take", stop_at_first_progress)
     jobs.add([blind, actions.check(project)])
-    until(lambda: jobs.facts()[0]["progress"])
-    jobs.stop(2)
-    jobs.stop(1)
     until(lambda: not jobs.busy)
     assert [job["state"] for job in jobs.facts()] == ["stopped", "stopped"]
     assert jobs.facts()[0]["code"] == 130 and not (project.folder / blind.out).exists()

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
+import shutil
 import time
 from pathlib import Path
 
 import pytest
 
-from scenes.demo import OFFICE, WEATHER
+from scenes.app import actions
+from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.library import write_library_system
 from tests.app.served import serving
 from tests.devtools import Page, chromium
 from tests.report.test_accessibility import AXE, FAULTS, GRAVE
 
 pytestmark = [pytest.mark.early, pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")]
+GLAZING = VENETIAN_BLIND.with_name("glazing.xml")
 STEPS = ("files", "building", "systems", "compute", "results")
 DONE_S = 900.0  # for the slow test's commands
 
@@ -215,3 +218,32 @@ def test_a_variant_is_made_once(tmp_path) -> None:
         assert not served.jobs.facts()
         assert served.project.study()["system"][0]["bsdf"] == "inputs/double-clear.xml"
         assert served.page("POST", "/api/library", {"glazing": "none"})[0] == 422
+
+
+def test_results_of_older_inputs_and_a_damaged_file_are_told(tmp_path) -> None:
+    """A damaged file of results is named; the rest of the page works, and says what is out of date."""
+    results = tmp_path / "project" / "results"
+    for name, file in (("report-glazing", "report.html"), ("comparison", "report.html")):
+        (results / name).mkdir(parents=True)
+        (results / name / file).write_text("<p class='answer'>Meets it.</p>", encoding="utf-8")
+    (results / "check.json").write_text("{", encoding="utf-8")
+    (results / "comparison" / "study.json").write_text('{"quick": true}', encoding="utf-8")
+    rows = "space,system,sda300_50,glare_intolerable_h,error\nA,glazing,81.5,212,\nA,blind,63.0,12,\n"
+    (results / "comparison" / "results.csv").write_text(rows, encoding="utf-8")
+    with serving(tmp_path / "project") as served:
+        for file in (OFFICE, WEATHER, GLAZING):
+            shutil.copyfile(file, served.project.folder / "inputs" / ".upload")
+            served.project.take(served.project.folder / "inputs" / ".upload", Path(file).name)
+        for one in actions.computations(served.project, {"report": True}):
+            line = {"command": ["cfs", *one.command], "kind": one.kind, "started": 1e9, "state": "done"}
+            served.project.record(line)
+        with Page(tmp_path) as page:
+            page.open(served.address)
+            assert "check.json" in page.value("document.getElementById('notices').innerText")
+            go(page, "results")
+            cards = page.value("[...document.querySelectorAll('#folders .card')].map((e) => e.innerText)")
+            (report,) = [text for text in cards if "report-glazing" in text]
+            assert "out of date" in report and "office.ifc" in report and "Meets it." in report
+            best = page.value("[...document.querySelectorAll('#variants .best')].map((e) => e.innerText)")
+            assert best == ["82", "12"]
+            page.screenshot(tmp_path / "results.png")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import time
 import tomllib
 from pathlib import Path
 
@@ -55,6 +57,43 @@ def test_toml_comes_back_as_it_was() -> None:
         "radius": float("inf"),
     }
     assert tomllib.loads(toml_text(table)) == table
+
+
+STUDY = """\
+# Two systems for the south side
+title = "A"  # as the client calls it
+
+[[room]]
+name = "office"
+building = "a.ifc"  # as built
+
+# before the client changed his mind
+[[system]]
+name = "first"
+bsdf = "a.xml"
+
+# by the maker
+[[system]]
+name = "second"
+bsdf = "b.xml"  # WINDOW 7.8
+
+[options]  # of all runs
+seed = 3  # the third
+"""
+
+
+def test_comments_of_a_study_file_stay() -> None:
+    table = tomllib.loads(STUDY)
+    assert toml_text(table, STUDY) == STUDY
+    table |= {"title": "B", "quick": True}
+    table["room"][0]["furniture"] = True
+    table["system"] = [*table["system"][1:], {"name": "third", "bsdf": "c.xml"}]
+    table["options"]["sensor_spacing"] = 0.5
+    text = toml_text(table, STUDY)
+    assert tomllib.loads(text) == table
+    for comment in ("# Two systems", "# as the client", "# as built", "# WINDOW 7.8", "# of all runs", "# the third"):
+        assert comment in text
+    assert text.index("furniture") < text.index("# before the client")
 
 
 @pytest.mark.parametrize(
@@ -298,3 +337,32 @@ def test_shades_keep_sun_and_heat_in_their_place() -> None:
             sheet, bare = found[glazing, one.name], found[glazing, ""]
             assert sheet.g_value < bare.g_value + 0.01 and sheet.u_value < bare.u_value
             assert sheet.tau_v <= bare.tau_v and sheet.tau_e <= sheet.g_value
+
+
+def test_results_say_what_changed_since(project) -> None:
+    (run, *_) = actions.computations(project, {"report": True, "annual_glare": True, "language": "de"})
+    name = Path(run.out).name
+    assert actions.outdated(project, name, project.journal()) == ()
+    at = time.time() + 10
+    project.record({"command": ["cfs", *run.command], "kind": "run", "started": round(at), "state": "done"})
+    assert actions.outdated(project, name, project.journal()) == ()
+    os.utime(project.folder / "inputs" / "office.ifc", (at + 5, at + 5))
+    assert actions.outdated(project, name, project.journal()) == ("office.ifc",)
+    project.change({"spaces": ["A South office"]})
+    assert actions.outdated(project, name, project.journal()) == ("office.ifc", "choices")
+
+
+def test_a_comparison_and_a_moving_system_know_their_files(project) -> None:
+    project.use_made(MadeSystem("moving", ("inputs/glazing.xml", "inputs/venetian_blind.xml")))
+    wanted = {"report": True, "compare": True}
+    at = time.time() + 10
+    for one in actions.computations(project, wanted):
+        project.record({"command": ["cfs", *one.command], "kind": one.kind, "started": round(at), "state": "done"})
+    os.utime(project.folder / "inputs" / "venetian_blind.xml", (at + 5, at + 5))
+    for name in ("report-moving", "report-venetian_blind", "comparison"):
+        assert actions.outdated(project, name, project.journal()) == ("venetian_blind.xml",), name
+    assert actions.outdated(project, "report-glazing", project.journal()) == ()
+    corrections = project.folder / "inputs" / "office.corrections.toml"
+    project.change({"corrections": {"north": 10}})
+    os.utime(corrections, (at + 5, at + 5))
+    assert "office.corrections.toml" in actions.outdated(project, "report-glazing", project.journal())

@@ -117,7 +117,13 @@ def dossier(language: str) -> str:
     rule = rule.model_copy(update={"criterion": tuple(one for one in rule.criterion if one.key in keys)})
     options = ComplyOptions(None, WEATHER, standards=("en17037",))
     files = ComplyFiles(
-        InputFiles(read_weather(WEATHER)), {"en17037": rule}, read_uses(), None, 13.0, Note("given by --sun-altitude")
+        InputFiles(read_weather(WEATHER)),
+        {"en17037": rule},
+        read_uses(),
+        None,
+        None,
+        13.0,
+        Note("given by --sun-altitude"),
     )
     south, north = shoebox(name="Office south"), shoebox(name="Store north", facing_deg=0)
     building = replace(south, name="<House>", spaces=(*south.spaces, *north.spaces))

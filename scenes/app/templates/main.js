@@ -129,12 +129,10 @@ function go() {
 }
 
 addEventListener("hashchange", go);
-await tried(async () => {
-  [page.state, page.check, page.rules, page.variants, page.library] = await Promise.all(
-    ["state", "check", "rules", "variants", "library"].map((path) => get(path)));
-  const last = page.state.journal.findLast((one) => one.kind === "comply");
-  page.wanted.standards = last ? last.command.filter((_, i) => last.command[i - 1] === "--standard") : [];
-});
+// Each part alone: a damaged file of results leaves the rest of the page
+await Promise.all(["state", "check", "rules", "variants", "library"].map((path) => tried(async () => { page[path] = await get(path); })));
+const last = page.state?.journal.findLast((one) => one.kind === "comply");
+page.wanted.standards = last ? last.command.filter((_, i) => last.command[i - 1] === "--standard") : [];
 page.step = STEPS.includes(location.hash.slice(1)) ? location.hash.slice(1) : "files";
 page.show();
 follow();

@@ -46,6 +46,13 @@ function remove(result) {
   });
 }
 
+// What results do not know yet
+function outdated(result) {
+  if (!result.outdated.length) return null;
+  const names = result.outdated.map((name) => (name === "choices" ? gettext("choices on this page") : name)).join(", ");
+  return h("p", {}, h("span", { class: "chip warning" }, gettext("out of date")), " ", gettext("Changed since: {names}. Compute again in step 4.", { names }));
+}
+
 function drawFolders() {
   const names = {
     report: gettext("Report"), dossier: gettext("Dossier"), explorer: gettext("Explorer"), table: gettext("Table (CSV)"),
@@ -55,6 +62,7 @@ function drawFolders() {
   byId("no-results").hidden = results.length > 0;
   fill(byId("folders"), results.map((result) => h("li", { class: "card" },
     h("h3", {}, kindOf(result.name), result.title ? `: ${result.title}` : ""), h("p", { class: "soft" }, `results/${result.name}, ${when.format(result.time * 1000)}`),
+    outdated(result),
     result.answers.length ? h("ul", { class: "answers" }, result.answers.map((text) => h("li", {}, text))) : null,
     h("p", { class: "links" }, Object.entries(result.pages).map(([key, path], i) => h("a", { href: page.link(path), target: "_blank", rel: "noopener", class: i ? "" : "main", ...(path.endsWith(".csv") ? { download: true } : {}) }, names[key]))),
     h("button", { type: "button", class: "quiet", "data-key": `clear ${result.name}`, "aria-label": gettext("Remove {name}", { name: result.name }), onclick: () => remove(result) }, gettext("Remove")))));
