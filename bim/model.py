@@ -309,6 +309,17 @@ class Element:
 
 
 @dataclass(frozen=True, slots=True)
+class ModelLuminaire:
+    """A luminaire that a model holds."""
+
+    name: str
+    position: tuple[float, float, float]  # [m]
+    turned_deg: float  # of its x axis from +x, anticlockwise
+    watts: float | None  # None: not stated
+    photometry: str  # name of its file; empty: not stated
+
+
+@dataclass(frozen=True, slots=True)
 class SpaceGroup:
     """Rooms that belong together: a dwelling, a thermal zone, a fire compartment."""
 
@@ -336,6 +347,7 @@ class Building:
     grids: tuple[ModelGrid, ...] = ()  # sensors that the file holds
     views: tuple[ModelView, ...] = ()  # that the file holds
     zones: tuple[SpaceGroup, ...] = ()  # of the rooms, as the file has them
+    luminaires: tuple[ModelLuminaire, ...] = ()  # that the file holds
 
     @property
     def windows(self) -> tuple[Window, ...]:

@@ -245,8 +245,10 @@ def _once(lines: Iterable[str]) -> tuple[str, ...]:
 def system_notes(systems: Iterable[FenestrationSystem], *, light_only: bool = False) -> tuple[str, ...]:
     """What was assumed of fenestration systems: bands, see-through peaks, U, g and window model."""
     systems = list(systems)
-    notes = [note for system in systems for note in (*system.notes, *peak_note(system))]
-    for heat in [] if light_only else map(thermal_system, systems):
+    stated = [system for system in systems if system.between is None]  # tilts between have the data of these
+    notes = [note for system in systems for note in system.notes]
+    notes += [note for system in stated for note in peak_note(system)]
+    for heat in [] if light_only else map(thermal_system, stated):
         notes += [*heat.notes, heat.named_model]
     return tuple(dict.fromkeys(notes))
 

@@ -26,6 +26,12 @@ SUNNY_HOUR_ERROR = "sunny_hour_error"  # [%] of sensors
 DGP_SUNNY_HOUR_ERROR = "dgp_sunny_hour_error"  # of pictures and hours
 
 
+def day_numbers(times: pd.DatetimeIndex) -> NDArray[np.int64]:
+    """Number of the day of each interval [H], from its middle."""
+    numbers: NDArray[np.int64] = pd.factorize(times.normalize())[0].astype(np.int64)
+    return numbers
+
+
 @dataclass(frozen=True, slots=True)
 class LuminancePicture:
     """A fisheye luminance picture of one hour, and its glare."""
@@ -181,21 +187,22 @@ class ShadingYear:
         """The state of each window [H, W]."""
         return self.states[:, self.number]
 
-    def figures(self, occupied: NDArray[np.bool_], per_day: int) -> pd.DataFrame:
+    def figures(self, occupied: NDArray[np.bool_], times: pd.DatetimeIndex) -> pd.DataFrame:
         """By group: its rule, moves a day, hours with a view out, and hours by state.
 
         Shares of the hours in which the room is occupied [%]; a view: at least half of the light
         of normal incidence that passes goes straight on.
 
-        Args: occupied: [H]; per_day: hours, or steps, of a day.
+        Args: occupied: [H]; times: [H] middle of each interval.
         """
+        per_day = pd.Timedelta(days=1) / (times[1] - times[0])
         moved = np.diff(self.states, axis=0) != 0
         used = self.states[occupied]
         table = {
             "group": self.groups,
             "rule": self.rules,
             "moves_per_day": moved.sum(axis=0) * per_day / max(len(self.states), 1),
-            "most_moves_of_a_day": self.moves_of_days(per_day).max(axis=0, initial=0),
+            "most_moves_of_a_day": self.moves_of_days(times).max(axis=0, initial=0),
         }
         if self.views:
             table["view_h"] = [
@@ -207,10 +214,13 @@ class ShadingYear:
             table[f"state_{state}_percent"] = 100.0 * share
         return pd.DataFrame(table)
 
-    def moves_of_days(self, per_day: int) -> NDArray[np.int64]:
-        """Moves of each group in each day [D, N]."""
+    def moves_of_days(self, times: pd.DatetimeIndex) -> NDArray[np.int64]:
+        """Moves of each group in each day [D, N].
+
+        Args: times: [H] middle of each interval.
+        """
         moved = np.concatenate([np.zeros_like(self.states[:1]), np.diff(self.states, axis=0)]) != 0
-        starts = np.arange(0, len(moved), per_day)
+        starts = np.unique(day_numbers(times), return_index=True)[1]
         counts: NDArray[np.int64] = np.add.reduceat(moved.astype(np.int64), starts, axis=0)
         return counts
 

@@ -247,11 +247,14 @@ def latched(states: StateArray, ends: ArrayLike) -> StateArray:
     return result
 
 
-def with_few_moves(states: StateArray, most: int, rows_of_day: int) -> StateArray:
-    """States [H] that change at most so often in each day; after that they stay until its end."""
+def with_few_moves(states: StateArray, most: int, day: NDArray[np.int64]) -> StateArray:
+    """States [H] that change at most so often in each day; after that they stay until its end.
+
+    Args: day: [H] number of the day of each row.
+    """
     result, moves = states.copy(), 0
     for row in range(1, len(states)):
-        if row % rows_of_day == 0:
+        if day[row] != day[row - 1]:
             moves = 0
         if moves >= most:
             result[row] = result[row - 1]

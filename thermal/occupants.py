@@ -23,17 +23,21 @@ RAISE_WHOLLY = 0.435, -2.31e-5, 1.95
 PART = -2.294, 1.522, 1.708  # Weibull: log of the scale, per unshaded share, shape
 
 
-def arrivals(present: ArrayLike, rows_of_day: int) -> NDArray[np.bool_]:
-    """Rows [H] in which the first people of a day come."""
+def arrivals(present: ArrayLike, day: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Rows [H] in which the first people of a day come.
+
+    Args: day: [H] number of the day of each row.
+    """
     there = np.asarray(present, dtype=float) > 0
-    days = np.arange(len(there)) // rows_of_day
     first = np.zeros(len(there), dtype=bool)
     rows = np.flatnonzero(there)
-    first[rows[np.unique(days[rows], return_index=True)[1]]] = True
+    first[rows[np.unique(day[rows], return_index=True)[1]]] = True
     return first
 
 
-def lightswitch_2002(direct_sun: ArrayLike, present: ArrayLike, rows_of_day: int, *, closed: int = 1) -> StateArray:
+def lightswitch_2002(
+    direct_sun: ArrayLike, present: ArrayLike, day: NDArray[np.int64], *, closed: int = 1
+) -> StateArray:
     """States [H] of a blind of Lightswitch-2002's active user.
 
     It is raised once a day, by those who come first, and lowered whenever people are there and
@@ -41,13 +45,13 @@ def lightswitch_2002(direct_sun: ArrayLike, present: ArrayLike, rows_of_day: int
     (Its passive user keeps it lowered all year: `always`.)
 
     Args: direct_sun: [H] irradiance of the work place straight from the sun, behind the open window
-        [W/m2]; present: [H] share of people; closed: the lowered state.
+        [W/m2]; present: [H] share of people; day: [H] number of the day; closed: the lowered state.
 
     Source: Reinhart 2004, Solar Energy 77(1), "Lightswitch-2002", section 2.3, from memory and from
     its users' descriptions: the paper was not available.
     """
     sun, there = np.asarray(direct_sun, dtype=float), np.asarray(present, dtype=float) > 0
-    first = arrivals(there, rows_of_day)
+    first = arrivals(there, day)
     states, lowered = np.zeros(len(sun), dtype=np.int64), False
     for row in range(len(sun)):
         lowered = (lowered and not first[row]) or bool(there[row] and sun[row] > DIRECT_SUN)
@@ -62,7 +66,7 @@ def haldi_robinson_2010(
     *,
     blinds: int,
     substeps: int = SUBSTEPS,
-    seed: int = 0,
+    seed: int | tuple[int, ...] = 0,
 ) -> FloatArray:
     """Mean unshaded share of each blind of a room in every hour [H, N].
 

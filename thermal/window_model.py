@@ -43,7 +43,6 @@ LEAST_EMISSIVITY, UNCOATED = 0.02, 0.84
 SHADE_DISTANCE = {"external": 0.10, "internal": 0.05, "integrated": 0.013}  # [m] to the glass
 SHADE_EDGES = {"external": 0.10, "internal": 0.05, "integrated": 0.01}  # [m] open
 SHADE_EMISSIVITY = 0.9
-BISECTIONS = 20
 
 
 def typical_unit(
@@ -173,11 +172,12 @@ def _with_shade(
 
 
 def bisected(excess: Callable[[float], float], low: float, high: float) -> float:
-    """Where a rising function passes zero between two arguments."""
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if excess(middle) > 0 else (middle, high)
-    return 0.5 * (low + high)
+    """Where a rising function passes zero between two arguments; the nearer one where it does not."""
+    from scipy.optimize import brentq
+
+    if excess(low) >= 0:
+        return low
+    return high if excess(high) <= 0 else float(brentq(excess, low, high, xtol=1e-6 * (high - low)))
 
 
 FloatArray = NDArray[np.float64]

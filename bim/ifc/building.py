@@ -38,6 +38,7 @@ from bim.ifc.elements import bounding_elements, outdoor_elements
 from bim.ifc.fenestration_read import read_fenestration
 from bim.ifc.furniture import furnished
 from bim.ifc.glass_of_rooms import GlassAccount, GlassOfRooms, apertures_in, glass_of_rooms, lost_glass
+from bim.ifc.luminaires import read_luminaires
 from bim.ifc.materials import SURFACES
 from bim.ifc.open_spaces import open_spaces
 from bim.ifc.passages import LARGEST_DOOR, Passage, open_apertures, passages
@@ -498,6 +499,7 @@ def read_ifc(
         map_georeference(source.model, source.placed, north_is_corrected=source.corrections.north_deg is not None),
         source.placed.matrix(),
         zones=read_zones(source.model, source.damage),
+        luminaires=read_luminaires(source),
     )
 
 

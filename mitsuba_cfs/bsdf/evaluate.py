@@ -7,6 +7,7 @@ tensor trees; `klems_of` gives the Klems matrices of any BSDF.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -399,6 +400,7 @@ def specular_exponent(peak: ThroughPeak, basis: KlemsBasis) -> float | None:
     return float(brentq(excess, 0.0, STEEPEST, xtol=1e-6))
 
 
+@cache
 def neighbours(basis: KlemsBasis) -> list[NDArray[np.int64]]:
     """Patches that share a border with each patch of the basis."""
     result = []
@@ -424,9 +426,7 @@ def held_beams(transmission: NDArray[np.float64], beams: NDArray[np.float64], ba
     directions nearest to it, no more than `ASTRAY` away: the cells of a tensor tree lie across
     patches, and so does what T has of its beam.
     """
-    omega, ways = basis.projected_solid_angles(), basis.outgoing_directions()
-    near = ways @ ways.T  # [K out, K in]: light straight on leaves by the patch of its number
-    order = np.argsort(-near, axis=0, kind="stable")
+    omega, (near, order) = basis.projected_solid_angles(), _by_nearness(basis)
     share = np.where(near >= np.cos(ASTRAY), transmission, 0.0) * omega[:, None] / omega
     share = np.take_along_axis(share, order, axis=0)
     taken = np.minimum(np.cumsum(share, axis=0), beams)
@@ -434,3 +434,14 @@ def held_beams(transmission: NDArray[np.float64], beams: NDArray[np.float64], ba
     held = np.empty_like(taken)
     np.put_along_axis(held, order, taken, axis=0)
     return held * omega / omega[:, None]
+
+
+@cache
+def _by_nearness(basis: KlemsBasis) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Cosine between outgoing directions [K out, K in], and their order [K out, K in], the nearest first.
+
+    Light straight on leaves by the patch of its number.
+    """
+    ways = basis.outgoing_directions()
+    near = ways @ ways.T
+    return near, np.argsort(-near, axis=0, kind="stable")

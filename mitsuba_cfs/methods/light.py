@@ -321,19 +321,28 @@ def with_view(light: ByPhases, view: View) -> ByPhases:
     return _with_view(light, view)
 
 
-def with_pictures(light: ByPhases, *, direct: bool = False, progress: Progress = silent) -> ByPhases:
+def with_pictures(
+    light: ByPhases, *, direct: bool = False, by_states: bool = False, progress: Progress = silent
+) -> ByPhases:
     """The light with the matrices of the view's pixels, for several calls that need them.
 
-    Args: direct: those of eDGP.
+    Args:
+        direct: those of eDGP.
+        by_states: whether what the pictures in a combination of states share is stored too.
     """
     if isinstance(light, SeasonalLight):
         lights: list[PhaseLight] = []
         count = len(light.lights)
         for i, one in enumerate(map(_by_phases, light.lights)):
             steps = part(progress, i / count, (i + 1) / count)
-            lights.append(with_phase_pictures(one, direct=direct, progress=steps))
+            lights.append(_with_pictures(one, direct, by_states, steps))
         return replace(light, lights=tuple(lights))
-    return with_phase_pictures(light, direct=direct, progress=progress)
+    return _with_pictures(light, direct, by_states, progress)
+
+
+def _with_pictures(light: PhaseLight, direct: bool, by_states: bool, progress: Progress) -> PhaseLight:
+    shown = with_phase_pictures(light, direct=direct, progress=progress)
+    return replace(shown, views={}) if by_states else shown
 
 
 def path_light_of(light: ByPhases) -> PathLight | SeasonalLight:

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +115,8 @@ class PhaseLight:
     sky: AnnualSky
     sensors: tuple[tuple[SensorLight, ...], ...] | None = None  # [G][J]; None: not computed
     reflected: ReflectedSun | None = None  # None where the sun's patches are taken
+    # what pictures in one combination of states share, for calls with few hours each; None: not stored
+    views: dict[tuple[Any, ...], tuple[Any, ...]] | None = None
 
     @property
     def scene(self) -> DaylightScene:

@@ -41,7 +41,7 @@ from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.matrices.adjacent import GlassToRoom
 from mitsuba_cfs.trace.pictures.adjacent import RoomShown
 from mitsuba_cfs.trace.pictures.annual import FivePhasePictures, ViewMatrices
-from mitsuba_cfs.trace.pictures.outdoors import outdoors
+from mitsuba_cfs.trace.pictures.outdoors import OutdoorCoefficients, outdoors
 from mitsuba_cfs.trace.sun.picture_beam import BeamLight, beam_light
 from mitsuba_cfs.trace.sun.picture_sun import PictureSun
 
@@ -138,27 +138,38 @@ def _five_phase_pictures(
         sky.illuminance[hours],
         beam=_beams(windows, luminance.shape),
     )
-    seen = outdoors(
-        interior,
-        exterior,
-        parts,
-        scattering,
-        eye,
-        subdivision=matrices.sampling.subdivision,
-        samples=matrices.sampling.outdoor_samples,
-        seed=matrices.sampling.seed,
-        scenes=matrices.scenes,
-    )
+    key = tuple(map(id, (matrices, *optics)))
+    if light.views is None or key not in light.views:
+        shared = _shared_by_hours(matrices, optics, in_state(light.systems, state))
+        if light.views is not None:
+            light.views[key] = (*shared, matrices, *optics)  # these, so that no other object gets their ids
+    else:
+        shared = light.views[key][:2]
+    seen, beam = shared
     daylight = direct_daylight(matrices) if direct else matrices.daylight.values
     pictures.show_outdoors(
-        seen,
-        daylight,
-        direct_daylight(matrices),
-        sky.without_sun(hours),
-        sky.sun_alone(hours),
-        light=_beam_light(matrices, in_state(light.systems, state)),
+        seen, daylight, direct_daylight(matrices), sky.without_sun(hours), sky.sun_alone(hours), light=beam
     )
     return pictures
+
+
+def _shared_by_hours(
+    matrices: PhaseMatrices, of_parts: Sequence[SystemOptics], of_groups: Sequence[SystemOptics]
+) -> tuple[OutdoorCoefficients, BeamLight | None]:
+    """What pictures of all hours show outdoors, and the windows' beams, with systems [Q], [G]."""
+    scene, sampling = matrices.scene, matrices.sampling
+    seen = outdoors(
+        scene.interior,
+        scene.exterior,
+        matrices.parts.groups,
+        [one.scattering for one in of_parts],
+        scene.eye,
+        subdivision=sampling.subdivision,
+        samples=sampling.outdoor_samples,
+        seed=sampling.seed,
+        scenes=matrices.scenes,
+    )
+    return seen, _beam_light(matrices, of_groups)
 
 
 def _windows(light: PhaseLight, hours: NDArray[np.int64], state: Sequence[int]) -> list[WindowLight]:

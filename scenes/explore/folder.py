@@ -59,7 +59,7 @@ STEPS = 256  # of the palette
 def write_explorer(result: RunResult, folder: Path, page: PageOptions = OWN_PAGE) -> None:
     """Write the explorer of a run's rooms that were computed for it.
 
-    A room that is equal to another has that one's light, and is named with it.
+    A room that is equal to another shares the files of its pictures and its daylight.
     """
     with in_language(page.language):
         write_rooms(result, folder)
@@ -69,12 +69,12 @@ def write_explorer(result: RunResult, folder: Path, page: PageOptions = OWN_PAGE
 def write_rooms(result: RunResult, folder: Path) -> None:
     """Write what the explorer of a run shows, without the page."""
     (folder / "data").mkdir(parents=True, exist_ok=True)
-    entries = []
+    entries: list[dict[str, Any]] = []
+    by_label: dict[str, dict[str, Any]] = {}
     for number, room in enumerate(one for one in result.spaces if one.explored is not None):
-        entry = write_room(folder, f"room{number}", result, room)
-        equal = [o.space.label for o in result.spaces if o.template == room.space.label]
-        entry["name"] += "".join(f", {label}" for label in equal)
-        entries.append(entry)
+        shared = by_label.get(room.template or "")
+        entries.append(write_room(folder, f"room{number}", result, room, shared=shared))
+        by_label.setdefault(room.space.label, entries[-1])
     first = result.times[0]
     colours = ColourScale(0, 1, "", "").rgba((np.arange(STEPS) + 0.5) / STEPS)[:, :3]
     write_data(
@@ -248,16 +248,20 @@ TEMPERATURES = {"outdoor": "outdoor_c", "air": "air_c", "operative": "operative_
 LOADS = {"heating": "heating_w", "cooling": "cooling_w", "lighting": "lighting_w"}
 
 
-def write_room(folder: Path, name: str, result: RunResult, room: RoomYear) -> dict[str, Any]:
+def write_room(
+    folder: Path, name: str, result: RunResult, room: RoomYear, *, shared: dict[str, Any] | None = None
+) -> dict[str, Any]:
     """Write a room's files, their names beginning with `name`; its entry of the case.
 
-    Args: folder: of the page; the files go into `data` there.
+    Args:
+        folder: of the page; the files go into `data` there.
+        shared: entry of a room with the same pictures and daylight, whose files it takes.
     """
     explored = room.explored
     if explored is None:
         raise ValueError(f"{room.space.label} was not computed for the explorer")
     states = range(len(explored.states))
-    for j in states:
+    for j in states if shared is None else ():
         write_pictures(folder / "data", f"{name}_state{j}", explored.pictures[j])
         codes = np.round(np.log1p(np.maximum(explored.illuminance[j], 0)) / LUX_STEP)
         write_data(folder / "data" / f"{name}_lux{j}.js", packed(codes, "u2"))
@@ -273,14 +277,14 @@ def write_room(folder: Path, name: str, result: RunResult, room: RoomYear) -> di
     }
     arrays = _arrays(result, room, explored)
     write_data(folder / "data" / f"{name}.js", {"facts": facts, "arrays": arrays})
-    return {
-        "name": room.space.label,
-        "states": list(explored.states),
-        "file": f"data/{name}",
+    files = {
         "models": [f"data/{name}_state{j}" for j in states],
         "lux": [f"data/{name}_lux{j}" for j in states],
         "melanopic": [f"data/{name}_mel{j}" for j in states] if explored.colour is not None else [],
     }
+    if shared is not None:
+        files = {key: shared[key] for key in files}
+    return {"name": room.space.label, "states": list(explored.states), "file": f"data/{name}", **files}
 
 
 def _arrays(result: RunResult, room: RoomYear, explored: ExploredRoom) -> dict[str, Any]:

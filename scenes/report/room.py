@@ -70,8 +70,7 @@ def state_carpets(result: RunResult, room: RoomYear) -> tuple[Chart, ...]:
     lit, shading = result.sun[:, 2] > 0, ran.shading
     several = len(shading.groups) > 1
     charts = []
-    per_day = round(pd.Timedelta(days=1) / (result.times[1] - result.times[0]))
-    figures = shading.figures(room.heat.comfort["occupied"].to_numpy(bool), per_day)
+    figures = shading.figures(room.heat.comfort["occupied"].to_numpy(bool), result.times)
     for number, (group, rule, state) in enumerate(zip(shading.groups, shading.rules, shading.states.T, strict=True)):
         count = np.bincount(state[lit], minlength=len(ran.states))
         legend = tuple(

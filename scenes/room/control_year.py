@@ -22,7 +22,16 @@ from scenes.room.operation import OperationHours
 from scenes.room.shading import MOST_COMBINATIONS, Levels, Seat, group_states, seat_view, shading_states, slat_tilts_deg
 from scenes.room.solar import SeasonalOutdoors, SunByStates, window_irradiance
 from scenes.room.window_sensors import window_beam
-from scenes.room.zone import RoomZone, ZoneSurfaces, climate, operated, per_window, room_zone, zone_surfaces
+from scenes.room.zone import (
+    RoomZone,
+    ZoneSurfaces,
+    climate,
+    lamp_daylight,
+    operated,
+    per_window,
+    room_zone,
+    zone_surfaces,
+)
 from thermal.climate import Solar
 from thermal.control import profile_angle
 from thermal.zone import Gains
@@ -56,6 +65,7 @@ class ControlYear:
         self._sensors: dict[tuple[int, ...], NDArray[np.float32]] = {}
         self._eyes: dict[tuple[Seat, tuple[int, ...]], FloatArray] = {}
         self._glare: dict[tuple[Seat, tuple[int, ...]], FloatArray] = {}
+        self._errors: dict[tuple[Seat, tuple[int, ...]], FloatArray] = {}
         self._views: dict[Seat, PhaseLight | SeasonalLight] = {}
         self._pictures: dict[Seat, PhaseLight | SeasonalLight] = {}
         self._lit = np.full(room.skies.hours, -1, dtype=np.int64)
@@ -140,24 +150,32 @@ class ControlYear:
         used = (self.room.occupied[day] | (day == hour)) & (self._lit[day] >= 0)
         return float(self.dgp_of(states, day[used], seat)[0])
 
-    def dgp_of(self, states: tuple[int, ...], hours: NDArray[np.int64], seat: Seat = (None, None)) -> FloatArray:
-        """DGP of a seat in some lit hours of the year [n]."""
+    def dgp_of(
+        self, states: tuple[int, ...], hours: NDArray[np.int64], seat: Seat = (None, None), *, sigmas: float = 0.0
+    ) -> FloatArray:
+        """DGP of a seat in some lit hours of the year [n].
+
+        Args: sigmas: so many standard errors of the tracing are added.
+        """
         key = seat, states
         if key not in self._glare:
-            self._glare[key] = np.full(len(self.room.skies.lit), np.nan)
+            count = len(self.room.skies.lit)
+            self._glare[key], self._errors[key] = np.full(count, np.nan), np.zeros(count)
+        errors = self._errors[key]
         rated, columns = self._glare[key], self._lit[hours]
         left = columns[np.isnan(rated[columns])]
         if len(left):
             if seat not in self._pictures:  # V of all patches: combinations are products then
-                self._pictures[seat] = with_pictures(self._view(seat))
-            rated[left] = hourly_glare(
+                self._pictures[seat] = with_pictures(self._view(seat), by_states=True)
+            glare = hourly_glare(
                 self._pictures[seat],
                 "DGP",
                 self._rows(states),
                 hours=left,
                 options=rating_of(self.room.options.outputs),
-            ).dgp
-        return rated[columns]
+            )
+            rated[left], errors[left] = glare.dgp, np.nan_to_num(glare.dgp_standard_error)
+        return rated[columns] + sigmas * errors[columns]
 
     @property
     def lit_hours(self) -> NDArray[np.int64]:
@@ -241,7 +259,10 @@ class ControlYear:
         solar = per_window(replace(solar, state=of_windows), zone)
         if tables is None:
             return ZoneHeat(solar, zone.gains, np.zeros(self.room.skies.hours))
-        plane = None if tables.gains.dimming is None else self.work_plane_lx(states)
+        plane = None
+        if tables.gains.dims:
+            lit = self.room.skies.whole_year(self.sensors_lx(states)).T
+            plane = lamp_daylight(tables, self.light.scene.points[: lit.shape[1]], lit)
         area = self.room.space.floor_area
         zone, lamps = operated(zone, tables, area, self.room.weather, plane)
         return ZoneHeat(solar, zone.gains, lamps)

@@ -148,7 +148,7 @@ def room_inputs(
     tables = None if operation is None else operation.of_room(building, space)
     if tables is not None:
         grid = (tuple(grids) or (options.grid,))[0]
-        tables = with_luminaires(tables, space, grid, seed=options.sampling.seed)
+        tables = with_luminaires(tables, building, space, grid, seed=options.sampling.seed)
     control = control_groups(space, None if tables is None else tables.control)
     return RoomInputs(
         building,

@@ -321,6 +321,7 @@ class LuminaireTable(TomlTable):
     """A luminaire of a room by its photometry, or several in a row."""
 
     file: Path  # .ies (IES LM-63) or .ldt (EULUMDAT)
+    zone: str = ""  # of `lighting_zone`
     position: tuple[float, float, float]  # [m]
     turned_deg: float = 0.0  # of C0 from +x, anticlockwise
     number: Annotated[int, Field(ge=1, le=1000)] = 1
@@ -334,6 +335,18 @@ class LuminaireTable(TomlTable):
         if self.number > 1 and not any(self.step):
             raise ValueError("step: several luminaires need a distance")
         return self
+
+
+class LightingZoneTable(TomlTable):
+    """Lamps of a room that one photosensor dims, or none."""
+
+    name: str
+    at: tuple[float, float] | None = None  # the sensor's place on the work plane [m]; None: its mean
+    share: Share | None = None  # of the room's lamps; with luminaires: those that name the zone
+    lighting_dimmed: bool = True  # False: no sensor
+    lighting_target_lx: Annotated[Positive, plausible.TARGET] | None = None  # None: the room's
+    lighting_sensor_factor: Annotated[float, Field(ge=0.1, le=10)] | None = None  # None: the room's
+    lighting_full_lx: Annotated[Positive, plausible.TARGET] | None = None  # at the sensor, by all lamps
 
 
 class GainsTable(TomlTable):
@@ -358,6 +371,9 @@ class GainsTable(TomlTable):
     # of the work plane by the lamps alone; default: the target
     lighting_full_lx: Annotated[Positive, plausible.TARGET] | None = None
     luminaire: tuple[LuminaireTable, ...] = ()  # in place of lighting_w_m2 and lighting_full_lx
+    luminaires: Literal["", "model"] = ""  # "model": those of the building's file, in place of `luminaire`
+    luminaire_w: Annotated[Positive, plausible.POWER] | None = None  # of the model's that state no power
+    lighting_zone: tuple[LightingZoneTable, ...] = ()  # parts of the lamps with sensors of their own
     lighting_standby_w_m2: Annotated[float, plausible.LAMPS] = 0.0  # at all hours, EN 15193-1's W_P
     radiant_share: Share = 0.5
     # clock hours of every day, or a schedule of the share of people; multiplies the constants above
@@ -365,15 +381,51 @@ class GainsTable(TomlTable):
 
     @model_validator(mode="after")
     def _states_lamps_once(self) -> GainsTable:
-        if self.luminaire:
+        if self.luminaire and self.luminaires:
+            raise ValueError("luminaires: the file has [[gains.luminaire]] of its own")
+        if self.luminaire or self.luminaires:
             for key in ("lighting_w_m2", "lighting_full_lx"):
                 if key in self.model_fields_set:
                     raise ValueError(f"{key}: follows from the luminaires")
         return self
 
+    @model_validator(mode="after")
+    def _zones_are_whole(self) -> GainsTable:
+        names = [zone.name for zone in self.lighting_zone]
+        if len(set(names)) < len(names):
+            raise ValueError("lighting_zone: two of the same name")
+        for number, one in enumerate(self.luminaire):
+            if (one.zone in names) != bool(names) or (one.zone and not names):
+                raise ValueError(f"luminaire.{number}.zone: expected one of {', '.join(names) or 'none'}")
+        shares = [zone.share for zone in self.lighting_zone]
+        if self.luminaire and any(share is not None for share in shares):
+            raise ValueError("lighting_zone: shares follow from the luminaires")
+        if names and self.luminaires:
+            raise ValueError("lighting_zone: luminaires of the model name no zones")
+        if names and not self.luminaire and abs(sum(share or 0.0 for share in shares) - 1.0) > 1e-6:
+            raise ValueError("lighting_zone: shares of the lamps add up to 1")
+        return self
+
+    @property
+    def zones(self) -> tuple[tuple[float, GainsTable, tuple[float, float] | None], ...]:
+        """Share of the lamps, their tables and the sensor's place of each zone; one without zones."""
+        if not self.lighting_zone:
+            return ((1.0, self, None),)
+        found = []
+        for zone in self.lighting_zone:
+            keys = ("lighting_dimmed", "lighting_target_lx", "lighting_sensor_factor", "lighting_full_lx")
+            changed = {key: getattr(zone, key) for key in keys if getattr(zone, key) is not None}
+            found.append((zone.share or 0.0, self.model_copy(update=changed | {"lighting_zone": ()}), zone.at))
+        return tuple(found)
+
+    @property
+    def dims(self) -> bool:
+        """Whether daylight dims some of the lamps."""
+        return any(tables.dimming is not None for _, tables, _ in self.zones)
+
     @property
     def dimming(self) -> Dimming | None:
-        """How daylight dims the lamps; None: it does not."""
+        """How daylight dims the lamps; None: it does not, or by zones (`zones`)."""
         if not (self.lighting_dimmed and self.lighting_w_m2):
             return None
         return Dimming(

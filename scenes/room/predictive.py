@@ -29,6 +29,7 @@ CLOSED = 0.1  # [Wh] of an hour with all groups closed: of equal plans the more 
 # Least DGP by Ev: Wienold and Christoffersen 2006 without sources, less 5 % for the noise of Ev
 LEAST = 0.95 * 5.87e-5, 0.16
 BY_EYE = 6.2e-5, 0.184  # of AFC's glare term by Ev, after Wienold 2009, equation of DGPs
+SIGMAS = 2.0  # standard errors of the tracing by which the DGP of a picture stays below the limit
 ROUNDS = 25  # of plans, each with the glare of those before
 FEW = 0.005  # share of the occupied hours with unrated glare at which plans end
 
@@ -48,6 +49,9 @@ def predictive_states(year: ControlYear, *, progress: Progress = silent) -> NDAr
     if year.room.weather.step_h != 1.0:
         message = "plans are of hours: the weather has steps of "
         message += f"{60 * year.room.weather.step_h:g} minutes"
+        raise DataError(message, element=year.room.space.label, field="control.rule")
+    if tables.gains.lighting_zone:
+        message = "plans have one photosensor: [[gains.lighting_zone]] goes with the other rules"
         raise DataError(message, element=year.room.space.label, field="control.rule")
     planner = Planner(year, tables, rule)
     for ahead in (1, tables.control.predictive.horizon_h):
@@ -128,7 +132,7 @@ class Planner:
         order = self._year.combinations
         for number in np.unique(numbers):
             hours = used[numbers == number]
-            values = self._year.dgp_of(self._combinations[number], hours, self._seat)
+            values = self._year.dgp_of(self._combinations[number], hours, self._seat, sigmas=SIGMAS)
             more_open = np.flatnonzero((order <= order[number]).all(axis=1))
             for hour, value in zip(hours.tolist(), values.tolist(), strict=True):
                 least = self.glare[hour, number]

@@ -105,13 +105,16 @@ def moved_result(result: Moved, space: Space) -> Moved:
     table[["x", "y", "z"]] += shift
     name = result.space.label
     eye = tuple((np.asarray(glare.view.position) + shift).tolist())
+    explored = result.explored
+    if explored is not None:
+        explored = replace(explored, windows=tuple(one + shift for one in explored.windows))
     return replace(
         result,
         space=space,
         daylight=replace(daylight, points=daylight.points + shift, sensor_metrics=table),
         glare=replace(glare, view=replace(glare.view, position=eye)),
         seconds={},
-        explored=None,  # the explorer shows that of the template
+        explored=explored,
         issues=tuple(moved_issue(issue, space, name) for issue in result.issues),
         template=name,
     )

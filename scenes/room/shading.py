@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -20,6 +21,7 @@ from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from scenes.fenestration.sight import sight_through
 from scenes.fenestration.systems import FenestrationSystem
+from scenes.results import day_numbers
 from scenes.room.glare import rating_of
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
@@ -370,7 +372,7 @@ def _by_rule(
             "open_delay_h": lambda one: delayed(one, wait),
             "hold_h": lambda one: held(one, hold),
             "until": lambda one: latched(one, _ends(room, rule.until)),
-            "most_moves": lambda one: with_few_moves(one, few, rows_of_day(room)),
+            "most_moves": lambda one: with_few_moves(one, few, days(room)),
         }
         for key in WAITS:
             if getattr(rule, key):
@@ -403,9 +405,9 @@ def _combined(closed: bool, parts: Sequence[tuple[StateArray, StateArray]]) -> t
     return extreme, np.where(change != 0, chosen, -1)
 
 
-def rows_of_day(room: RoomInputs) -> int:
-    """Steps of the weather in a day."""
-    return round(24 / room.weather.step_h)
+def days(room: RoomInputs) -> NDArray[np.int64]:
+    """Number of the day of each hour [H], by the weather's local standard time."""
+    return day_numbers(room.weather.midpoints)
 
 
 def _ends(room: RoomInputs, until: str) -> NDArray[np.bool_]:
@@ -413,11 +415,11 @@ def _ends(room: RoomInputs, until: str) -> NDArray[np.bool_]:
     if until == "sunset":
         return ~is_up(sun_directions(room.weather))
     if until == "midnight":
-        return np.arange(room.skies.hours) % rows_of_day(room) == 0
+        return np.concatenate([[True], np.diff(days(room)) != 0])
     if until == "sunrise":
         up = is_up(sun_directions(room.weather))
         return np.concatenate([up[:1], up[1:] & ~up[:-1]])
-    return arrivals(room.occupied, rows_of_day(room))
+    return arrivals(room.occupied, days(room))
 
 
 class _Signals:
@@ -540,9 +542,9 @@ def _by_direct_sun(room: RoomInputs, light: RoomLight, members: list[int], rule:
     nearest = int(np.argmin(np.linalg.norm(light.scene.points[plane] - np.array(place), axis=1)))
     sky, normal = room.skies, room.weather.direct_normal[room.skies.lit]
     watts = np.where(sky.illuminance > 0, normal / np.maximum(sky.illuminance, 1e-9), 0.0)
-    present, rows = _present(room), rows_of_day(room)
+    present, day = _present(room), days(room)
     return {
-        c: lightswitch_2002(sky.whole_year(of_group[nearest] * watts), present, rows, closed=_closed(room, c))
+        c: lightswitch_2002(sky.whole_year(of_group[nearest] * watts), present, day, closed=_closed(room, c))
         for c, of_group in zip(members, direct, strict=True)
     }
 
@@ -582,7 +584,7 @@ def _by_habit(
         level,
         _present(room),
         blinds=len(members),
-        seed=rule.seed,
+        seed=(rule.seed, zlib.crc32(room.space.guid.encode())),  # other people in each room
         substeps=max(round(12 * room.weather.step_h), 1),
     )
     return {c: np.rint((1.0 - shares[:, n]) * (counts[n] - 1)).astype(np.int64) for n, c in enumerate(members)}

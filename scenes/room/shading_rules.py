@@ -341,6 +341,12 @@ class ControlTable(ShadingRule):
                     return f"{place}.{key}", 'the rule "predictive" does not wait: leave it out'
         return None
 
+    @property
+    def is_random(self) -> bool:
+        """Whether people of a seed move the windows: others in each room."""
+        leaves = (leaf for _, rule in self.rules for leaf in rule.leaves)
+        return any(leaf.rule == "manual" and leaf.behaviour == "Haldi-Robinson" for leaf in leaves)
+
     def rule_of(self, group: GroupTable | None) -> ShadingRule:
         """The rule of an entry of `group`; None: of the windows that no entry names."""
         stated = {key: getattr(self, key) for key in ShadingRule.model_fields}

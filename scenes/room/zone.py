@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -28,7 +28,7 @@ from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
 from scenes.results import DaylightResult, ShadingYear
 from scenes.room.inputs import RoomInputs
 from scenes.room.operation import OperationHours
-from scenes.room.operation_tables import GroundTable, NeighbourTable, OperationTables
+from scenes.room.operation_tables import GainsTable, GroundTable, NeighbourTable, OperationTables
 from scenes.room.options import Occupancy
 from scenes.room.shading import RuledYear
 from scenes.room.shading_rules import JOINT_RULES
@@ -51,7 +51,7 @@ from thermal.ground import (
 )
 from thermal.kernel import advance
 from thermal.ventilation import AirTransfer
-from thermal.zone import Gains, Layer, OpaqueSurface, Zone, dimmed_light, dimmed_share, split_gains
+from thermal.zone import Dimming, Gains, Layer, OpaqueSurface, Zone, dimmed_light, dimmed_share, split_gains
 
 DOWNWARDS = -0.7  # z of a floor's normal
 
@@ -505,7 +505,7 @@ def reads_work_plane(room: RoomInputs) -> bool:
     tables = room.operation
     if tables is None or not room.space.windows:
         return False
-    dimmed = tables.gains.dimming is not None
+    dimmed = tables.gains.dims
     leaves = (leaf for rule in room.control.rules for leaf in rule.leaves)
     by_light = any(leaf.rule in (*JOINT_RULES, "manual") for leaf in leaves)
     return by_light or dimmed
@@ -531,9 +531,12 @@ def room_zone(
     zone, lamps, lit = surfaces.room, np.zeros(room.skies.hours), None
     plane = work_plane(room, daylight)
     if room.operation is not None:
-        lit = lamp_lux(room.operation, room.weather, plane)
+        at_lamps = None
+        if daylight is not None and plane is not None:
+            at_lamps = lamp_daylight(room.operation, daylight.points, daylight.illuminance)
+        lit = lamp_lux(room.operation, room.weather, at_lamps)
         area = room.space.floor_area
-        operated_zone, lamps = operated(zone.zone, room.operation, area, room.weather, plane)
+        operated_zone, lamps = operated(zone.zone, room.operation, area, room.weather, at_lamps)
         zone = enveloped(replace(zone, zone=operated_zone), room.building, room.space, room.operation, room.weather)
         services = services_of(room.operation, area, room.weather)
     else:
@@ -674,10 +677,34 @@ def lamp_lux(tables: OperationTables, weather: Weather, daylight: FloatArray | N
     if gains.lighting_full_lx is None:
         return None
     used = OperationHours(tables, weather).lamps(1.0) > 0
-    dimming = gains.dimming
-    if daylight is None or dimming is None:
-        return used * gains.lighting_full_lx
-    return used * gains.lighting_full_lx * dimmed_light(daylight, dimming)
+    return used * gains.lighting_full_lx * _of_lamps(gains, daylight, dimmed_light)
+
+
+def lamp_daylight(tables: OperationTables, points: FloatArray, illuminance: NDArray[np.floating]) -> FloatArray:
+    """Daylight at the sensors of the lamps' zones [Z, H] [lx]: the mean of the work plane, or at a place.
+
+    Args: points: [S, 3] of the work plane [m]; illuminance: [H, S] [lx].
+    """
+    found = []
+    for _, _, at in tables.gains.zones:
+        if at is None:
+            found.append(illuminance.mean(axis=1, dtype=float))
+        else:
+            nearest = np.linalg.norm(points[:, :2] - np.array(at), axis=1).argmin()
+            found.append(illuminance[:, nearest].astype(float))
+    return np.stack(found)
+
+
+def _of_lamps(
+    gains: GainsTable, daylight: FloatArray | None, share_of: Callable[[FloatArray, Dimming], FloatArray]
+) -> FloatArray:
+    """Share of all lamps [H] or [1], of the shares of the zones by their daylight [Z, H]."""
+    total = np.zeros(1)
+    for number, (share, tables, _) in enumerate(gains.zones):
+        dimming = tables.dimming
+        undimmed = daylight is None or dimming is None
+        total = total + share * (np.ones(1) if undimmed else share_of(np.atleast_2d(daylight)[number], dimming))
+    return total
 
 
 def operated(
@@ -685,13 +712,11 @@ def operated(
 ) -> tuple[Zone, FloatArray]:
     """The zone with the gains, air and set points of the tables, and the lamps' power [H] [W].
 
-    Args: daylight: [H] mean illuminance of the work plane [lx], by which the lamps are dimmed;
-        None: they are not dimmed.
+    Args: daylight: [Z, H] at the sensors of the lamps' zones [lx] (`lamp_daylight`), by which they are
+        dimmed; None: they are not dimmed.
     """
     hours, gains = OperationHours(tables, weather), tables.gains
-    lamps = hours.lamps(floor_area)
-    if daylight is not None and gains.dimming is not None:
-        lamps = lamps * dimmed_share(daylight, gains.dimming)
+    lamps = hours.lamps(floor_area) * _of_lamps(gains, daylight, dimmed_share)
     lamps = lamps + gains.lighting_standby_w_m2 * floor_area
     result = replace(
         zone,

@@ -185,8 +185,7 @@ def _write_shading(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None
         return
     shading = room.operation.shading
     occupied = room.heat.comfort["occupied"].to_numpy(bool)
-    per_day = round(pd.Timedelta(days=1) / (times[1] - times[0]))
-    _csv(shading.figures(occupied, per_day), place / "shading.csv", index=False)
+    _csv(shading.figures(occupied, times), place / "shading.csv", index=False)
     _csv(shading.moves(times), place / "shading_moves.csv", index=False)
 
 

@@ -136,6 +136,8 @@ def _interchangeable(inputs: Inputs, options: JobOptions, one: Space, other: Spa
         tables = [operation.tables.of_room(building, room) for room in rooms]
         if tables[0] != tables[1] or any(group.windows for group in tables[0].control.group):
             return False  # other values, or a rule for windows of one of them
+        if tables[0].control.is_random:
+            return False  # other people
     if options.colour and not same_hues(one, other):
         return False
     if not balanced_together(inputs, options):

@@ -11,13 +11,18 @@ import numpy as np
 from bim.model import Building, Element, Space
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.progress import silent
+from scenes.explore.case_files import read_case, read_data
+from scenes.explore.folder import write_rooms
 from scenes.room.operation import read_operation
 from scenes.room.options import RoomOptions
 from scenes.room.room import compute_room, lit_room
 from scenes.room.series import OutdoorLight, moved_result, same_systems
 from scenes.room.windows import in_all_windows
 from scenes.run.options import JobOptions
+from tests.explore.synthetic import explored_run
 from tests.scenes.small_box import BOX, ROOM, SMALL
+
+SHIFT = np.array([10.0, 0.0, 3.0])
 
 
 def moved(building: Building, offset: tuple[float, float, float], name: str):
@@ -56,6 +61,40 @@ def test_an_equal_room_has_the_results_of_its_template(variant, weather, skies, 
     mean = given.daylight.illuminance.mean(axis=0)
     # the same random numbers; single paths go another way by rounding of coordinates
     np.testing.assert_allclose(mean, other.daylight.illuminance.mean(axis=0), rtol=0.03)
+
+
+def test_an_equal_room_is_offered_by_its_name_in_the_explorer(tmp_path) -> None:
+    """It has its own plan, and the files of the pictures of its template."""
+    run = explored_run()
+    one = run.spaces[0]
+    twin = replace(
+        one.space,
+        faces=tuple(replace(f, triangles=f.triangles + SHIFT) for f in one.space.faces),
+        windows=tuple(replace(w, triangles=w.triangles + SHIFT) for w in one.space.windows),
+        guid="twin-guid",
+        name="twin",
+    )
+    write_rooms(replace(run, spaces=(one, moved_result(one, twin))), tmp_path)
+    entries = read_case(tmp_path)["rooms"]
+    assert [entry["name"] for entry in entries] == [one.space.label, twin.label]
+    assert entries[0]["models"] == entries[1]["models"] and entries[0]["lux"] == entries[1]["lux"]
+    outlines = [read_data(tmp_path / f"{entry['file']}.js")["facts"]["plan"]["bounds"] for entry in entries]
+    assert np.subtract(*outlines[::-1]).tolist() == [10.0, 0.0, 10.0, 0.0]
+    assert not list((tmp_path / "data").glob("room1_state*"))
+
+
+def test_rooms_whose_people_draw_lots_are_not_interchangeable(weather, glass, tmp_path) -> None:
+    from scenes.run import run
+
+    twin = moved(BOX, (10.0, 0.0, 3.0), "twin")
+    building = replace(BOX, spaces=(ROOM, twin))
+    path, found = tmp_path / "operation.toml", []
+    for behaviour in ("Lightswitch-2002", "Haldi-Robinson"):
+        path.write_text(f'[control]\nrule = "manual"\nbehaviour = "{behaviour}"\n')
+        systems = in_all_windows(ROOM, glass) | in_all_windows(twin, glass)
+        inputs = run.Inputs(building, [ROOM, twin], weather, systems, read_operation(path))
+        found.append(run._interchangeable(inputs, JobOptions(Path(), Path()), ROOM, twin))
+    assert found == [True, False]
 
 
 def test_a_run_computes_equal_rooms_once(variant, weather, skies, glass, monkeypatch) -> None:

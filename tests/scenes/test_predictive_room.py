@@ -79,6 +79,18 @@ def test_an_hour_takes_the_cheapest_combination_without_glare(of, every_dgp, lim
             assert chosen == every_dgp[:, number].argmin()
 
 
+def test_plans_rate_glare_with_the_error_of_the_tracing(of) -> None:
+    """Two standard errors above the DGP that a control function reads."""
+    year, hours = of(0.32), np.array(HOURS)
+    planner = Planner(year, year.room.operation, year.room.control.rules[0])
+    assert planner.rate(np.zeros(8760, dtype=np.int64)) == len(HOURS)
+    first = tuple(year.combinations[0].tolist())
+    dgp, above = year.dgp_of(first, hours), year.dgp_of(first, hours, sigmas=2.0)
+    assert (above > dgp).all() and (above < dgp + 0.1).all()
+    assert planner.glare[hours, 0] == pytest.approx(above)
+    assert year.dgp(first, HOURS[0]) == dgp[0]
+
+
 def test_plans_are_the_control_of_a_file(of) -> None:
     """As states of the window groups, and as a function of the hour."""
     year = of(0.32)

@@ -162,7 +162,7 @@ def test_what_moved_the_windows_is_known(inputs) -> None:
     assert (south["to_state"][hours == 20] == 1).all()
     counts = shading.moves_by_reason()
     assert sum(int(one.sum()) for one in counts.values()) == len(moves)
-    assert shading.moves_of_days(24).sum() == len(moves)
+    assert shading.moves_of_days(room.weather.midpoints).sum() == len(moves)
 
 
 def test_view_is_preferred_where_states_are_equally_good(inputs) -> None:
@@ -171,7 +171,7 @@ def test_view_is_preferred_where_states_are_equally_good(inputs) -> None:
     plain, seen = inputs(limit), inputs(limit | {"prefer": "view"})
     light = room_light(plain)
     years = [room.shading(shading_states(room, light)) for room in (plain, seen)]
-    views = [year.figures(plain.occupied, 24)["view_h"].to_numpy() for year in years]
+    views = [year.figures(plain.occupied, plain.weather.midpoints)["view_h"].to_numpy() for year in years]
     assert [view.tolist() for view in years[0].views] == [[True, False, True]] * 2
     assert views[1].sum() > 1.1 * views[0].sum()
     assert np.count_nonzero(years[1].states == 1) < np.count_nonzero(years[0].states == 1)

@@ -128,8 +128,9 @@ def test_closed_until_an_event_and_few_moves_a_day():
     states = np.array([0, 1, 0, 2, 1, 0, 0, 1])
     ends = np.arange(8) == 5
     assert latched(states, ends).tolist() == [0, 1, 1, 2, 2, 0, 0, 1]
-    assert with_few_moves(states, 2, 4).tolist() == [0, 1, 0, 0, 1, 0, 0, 0]
-    assert np.array_equal(with_few_moves(states, 8, 4), states)
+    assert with_few_moves(states, 2, np.arange(8) // 4).tolist() == [0, 1, 0, 0, 1, 0, 0, 0]
+    assert with_few_moves(states, 2, np.arange(2, 10) // 4).tolist() == [0, 1, 0, 2, 2, 2, 0, 1]
+    assert np.array_equal(with_few_moves(states, 8, np.zeros(8, int)), states)
 
 
 def test_depth_of_the_sun_behind_a_window():

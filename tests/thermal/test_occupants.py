@@ -8,20 +8,21 @@ import pytest
 from thermal.occupants import arrivals, haldi_robinson_2010, lightswitch_2002
 
 PRESENT = np.tile((np.arange(24) >= 8) & (np.arange(24) < 18), 3).astype(float)
+DAY = np.repeat([0, 1, 2], 24)
 
 
 def test_the_first_who_come_are_those_of_a_day() -> None:
-    assert np.flatnonzero(arrivals(PRESENT, 24)).tolist() == [8, 32, 56]
+    assert np.flatnonzero(arrivals(PRESENT, DAY)).tolist() == [8, 32, 56]
     lunch = PRESENT.copy()
     lunch[12] = 0
-    assert np.flatnonzero(arrivals(lunch, 24)).tolist() == [8, 32, 56]
+    assert np.flatnonzero(arrivals(lunch, DAY)).tolist() == [8, 32, 56]
 
 
 def test_lightswitch_lowers_once_and_raises_in_the_morning() -> None:
     sun = np.zeros(72)
     sun[[6, 10, 33]] = 51.0  # before anybody is there, in the morning, on the second day
     sun[11] = 50.0
-    states = lightswitch_2002(sun, PRESENT, 24, closed=2)
+    states = lightswitch_2002(sun, PRESENT, DAY, closed=2)
     assert np.flatnonzero(np.diff(states)).tolist() == [9, 31, 32, 55]
     assert set(states) == {0, 2}
 

@@ -184,10 +184,14 @@ def main(
     method: str = "three-phase",
     paths: int = 0,
     samples: int = 65536,
+    only: str = "",
 ) -> None:
     """Print the tables.
 
-    Args: other: weather of another year, that fixed rules are tuned on; paths: hours to trace.
+    Args:
+        other: weather of another year, that fixed rules are tuned on.
+        paths: hours to trace, of the plan with an error of the forecast.
+        only: one plan, by its name, and no fixed rules.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -196,15 +200,15 @@ def main(
         print("| control | kWh | heating | cooling | lamps | DGP > .40 | moves a day | raised | CPU |")
         print("|---|---|---|---|---|---|---|---|---|")
         years = []
-        for plan, table in PLANS.items():
+        for plan, table in {key: PLANS[key] for key in ([only] if only else PLANS)}.items():
             control = f'rule = "predictive"\nlimit_dgp = {LIMIT}\n[control.predictive]\n{table}'
             years.append(controlled(plan, control, weather, method, folder, family))
             print(years[-1].row, flush=True)
-        rules = [("cut-off", CUT_OFF), ("most open without glare", WITHOUT_GLARE)]
+        rules = [] if only else [("cut-off", CUT_OFF), ("most open without glare", WITHOUT_GLARE)]
         if other is not None:
             best, control = best_rule(other, method, folder, family)
             rules.append((f"{best}, tuned on {other.stem}", control))
         for rule, control in rules:
             print(controlled(rule, control, weather, method, folder, family).row, flush=True)
         if paths:
-            print(f"\n{by_paths(years[1], weather, folder, family, paths)}")
+            print(f"\n{by_paths(years[0 if only else 1], weather, folder, family, paths)}")

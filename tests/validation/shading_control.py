@@ -5,6 +5,10 @@
 A room in Chicago with equal windows to the south and to the north, open and below an overhang with
 a fin.  EnergyPlus runs here and now with a `WindowShadingControl` for each window:
 `OnIfHighSolarOnWindow`, and the slat angles of `BlockBeamSolar`.  Ours is the study's: `run_study`.
+
+The column "same cause" has the hours that remain when both sides have the same sun (cut-off), or when the
+plates hide the ground from the window as a closed form says (irradiance).  The sun of both is compared with
+the Astronomical Almanac's.
 """
 
 from __future__ import annotations
@@ -18,6 +22,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.sun import sun_directions
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
@@ -133,6 +139,7 @@ OUTPUTS = {
         ("Surface Window Blind Slat Angle", "angle"),
         ("Surface Outside Face Incident Beam Solar Radiation Rate per Area", "beam"),
         ("Surface Outside Face Incident Solar Radiation Rate per Area", "sun"),
+        ("Surface Outside Face Incident Ground Diffuse Solar Radiation Rate per Area", "ground"),
     )
 } | {"Environment:Site Solar Altitude Angle": "altitude", "Environment:Site Solar Azimuth Angle": "azimuth"}
 
@@ -151,12 +158,58 @@ def energyplus_cut_off(table: pd.DataFrame, name: str) -> NDArray[np.int64]:
 
 def cut_off_under(table: pd.DataFrame, name: str) -> NDArray[np.int64]:
     """Our rule with the sun and the beam of EnergyPlus [H]."""
-    altitude, azimuth = (np.radians(table[key].to_numpy()) for key in ("altitude", "azimuth"))
-    level = np.cos(altitude)
-    facing = -level * np.cos(azimuth) if name == "S" else level * np.cos(azimuth)
-    local = np.stack([level * np.sin(azimuth), np.sin(altitude), facing], axis=1)
+    east, north, up = their_sun(table).T
+    local = np.stack([east, up, -north if name == "S" else north], axis=1)
     beam = table[f"{name} beam"].to_numpy()
     return by_cut_off(local, beam, np.radians(TILTS), WIDTH, SPACING)
+
+
+def their_sun(table: pd.DataFrame) -> NDArray[np.float64]:
+    """EnergyPlus' direction to the sun [H, 3]."""
+    altitude, azimuth = (np.radians(table[key].to_numpy()) for key in ("altitude", "azimuth"))
+    level = np.cos(altitude)
+    return np.stack([level * np.sin(azimuth), level * np.cos(azimuth), np.sin(altitude)], axis=1)
+
+
+def almanac_sun() -> NDArray[np.float64]:
+    """Direction to the sun [H, 3] by the Astronomical Almanac's formula of low precision (0.01 degrees).
+
+    In the middle of the weather's hours; without refraction.  Source: Michalsky 1988, Solar Energy 40(3).
+    """
+    weather = read_epw(WEATHER)
+    utc = weather.midpoints - pd.Timedelta(hours=weather.timezone_h)
+    days = utc.to_julian_date().to_numpy() - 2451545.0
+    anomaly = np.radians((357.528 + 0.9856003 * days) % 360.0)
+    mean = 280.460 + 0.9856474 * days
+    ecliptic = np.radians((mean + 1.915 * np.sin(anomaly) + 0.020 * np.sin(2 * anomaly)) % 360.0)
+    tilt = np.radians(23.439 - 4e-7 * days)
+    ascension = np.arctan2(np.cos(tilt) * np.sin(ecliptic), np.cos(ecliptic))
+    declination = np.arcsin(np.sin(tilt) * np.sin(ecliptic))
+    clock = (utc - utc.normalize()).total_seconds().to_numpy() / 3600.0
+    sidereal = np.radians((15.0 * ((6.697375 + 0.0657098242 * days + clock) % 24.0) + weather.longitude_deg) % 360.0)
+    hour, north = sidereal - ascension, np.radians(weather.latitude_deg)
+    return np.stack(
+        [
+            -np.cos(declination) * np.sin(hour),
+            np.sin(declination) * np.cos(north) - np.cos(declination) * np.cos(hour) * np.sin(north),
+            np.sin(declination) * np.sin(north) + np.cos(declination) * np.cos(hour) * np.cos(north),
+        ],
+        axis=1,
+    )
+
+
+def ground_seen(rays: int = 1_000_000) -> float:
+    """Share of the ground's view factor from the window that the fin leaves, by directions of the cosine.
+
+    The overhang is above the glass and hides none of the ground.
+    """
+    u = np.random.default_rng(1).random((4, rays))
+    x, z = 0.5 + 3.0 * u[0], 1.0 + 1.5 * u[1]
+    along, around = np.sqrt(u[2]), 2 * np.pi * u[3]
+    dx, dz, out = along * np.cos(around), along * np.sin(around), np.sqrt(1 - u[2])
+    far = (3.6 - x) / np.where(dx > 0, dx, np.inf)
+    hidden = (dx > 0) & (out * far < FIN) & (z + dz * far > 0.0) & (z + dz * far < 3.0)
+    return 1.0 - float(hidden[dz < 0].mean())
 
 
 def compare() -> pd.DataFrame:
@@ -174,6 +227,9 @@ def compare() -> pd.DataFrame:
                 row = _row(f"irradiance above {limit:.0f} W/m2", shaded, name, ours[name].to_numpy(), on)
                 # its control does not read the reflections that its heat balance then has
                 other = (reflected[f"{name} sun"].to_numpy() > limit).astype(int)
+                hidden = (1.0 - ground_seen()) * theirs[f"{name} ground"] if shaded else 0.0
+                same = ((theirs[f"{name} sun"] - hidden).to_numpy() > limit).astype(int)
+                row["same cause h"] = int((ours[name].to_numpy() != same).sum())
                 rows.append(row | {"its two models differ h": int((other != on).sum())})
         control = {
             "shading_control_type": "OnIfHighSolarOnWindow",
@@ -185,9 +241,8 @@ def compare() -> pd.DataFrame:
         ours = our_states(rule, len(TILTS), shaded=shaded)
         for name in WINDOWS:
             slats = energyplus_cut_off(theirs, name)
-            rows.append(_row("cut-off", shaded, name, ours[name].to_numpy(), slats))
-            same_sun = cut_off_under(theirs, name)
-            rows.append(_row("cut-off, EnergyPlus' sun", shaded, name, same_sun, slats))
+            row = _row("cut-off", shaded, name, ours[name].to_numpy(), slats)
+            rows.append(row | {"same cause h": int((cut_off_under(theirs, name) != slats).sum())})
     return pd.DataFrame([*rows, *_scenarios()])
 
 
@@ -231,6 +286,21 @@ def _row(rule: str, shaded: bool, window: str, ours: NDArray[np.int64], theirs: 
     }
 
 
+def sun_errors() -> pd.DataFrame:
+    """Angle between the sun of both programs and the Almanac's while it is up [deg]."""
+    theirs = run_energyplus(
+        energyplus_model({"shading_control_type": "AlwaysOn"}, shaded=False), WEATHER, outputs=OUTPUTS
+    )
+    right = almanac_sun()
+    up = right[:, 2] > np.sin(np.radians(5.0))  # above what refraction lifts
+    rows = []
+    for name, sun in (("mitsuba-cfs", sun_directions(read_epw(WEATHER))), ("EnergyPlus", their_sun(theirs))):
+        apart = np.degrees(np.arccos(np.clip(np.sum(sun * right, axis=1)[up], -1.0, 1.0)))
+        rows.append({"sun": name, "rms deg": np.sqrt(np.mean(apart**2)), "most deg": apart.max()})
+    return pd.DataFrame(rows)
+
+
 def main() -> pd.DataFrame:
-    """All rules, surroundings and windows."""
+    """All rules, surroundings and windows, after the errors of the sun."""
+    print(sun_errors().round(3).to_string(index=False), f"\n\nground seen beside the fin: {ground_seen():.3f}\n")
     return compare()
