@@ -104,6 +104,8 @@ def _highest_and_lowest(text: str, least: tuple[str, float], most: tuple[str, fl
     values = {"quantity": text, "case": most[0], "share": percent(most[1])}
     if least[0] == most[0]:
         return gettext("{quantity}: {share} % ({case}).", **values)
+    if percent(least[1]) == percent(most[1]):
+        return gettext("{quantity}: {share} % in all cases.", quantity=text, share=percent(most[1]))
     return gettext(
         "{quantity}: highest {share} % ({case}), lowest {lowest} % ({other}).",
         **values,
@@ -114,7 +116,10 @@ def _highest_and_lowest(text: str, least: tuple[str, float], most: tuple[str, fl
 
 def _glare_sentence(study: StudyResult) -> str:
     done = [result for _, _, result in finished(study)]
-    if any(f"glare_{CLASSES[0]}_h" not in result.figures for result in done):
+    rated = [f"glare_{CLASSES[0]}_h" in result.figures for result in done]
+    if not any(rated):
+        return gettext("Glare was not rated.")
+    if not all(rated):
         return gettext("Glare was not rated in all cases.")
     least, most = _extremes(study, glare_share)
     text = gettext("Share of the occupied hours with a DGP above 0.40")
@@ -126,8 +131,11 @@ def _heat(study: StudyResult) -> str:
     cool, warm = _extremes(study, warm_share)
     text = gettext("Share of the occupied hours above {limit} °C", limit=f"{WARM_C:.0f}")
     text = _highest_and_lowest(text, cool, warm)
-    if any(not set(ENERGIES) <= set(result.figures) for _, _, result in finished(study)):
+    known = [set(ENERGIES) <= set(result.figures) for _, _, result in finished(study)]
+    if any(known) and not all(known):
         return text + " " + gettext("Not all cases have heating and cooling.")
+    if not any(known):
+        return text + " " + gettext("Without heating and cooling.")
     least, most = _extremes(study, lambda result: sum(result.figures[e] for e in ENERGIES))
     if most[1] <= 0:
         return text + " " + gettext("Without heating and cooling.")
