@@ -13,11 +13,10 @@ from mitsuba_cfs.bsdf.colour import relative_rgb
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, diffuse_reflectance, spectral_transmittance
 from mitsuba_cfs.spectra.channels import Channels
-from mitsuba_cfs.spectra.detectors import NANOMETRES, illuminant, sensitivities
+from mitsuba_cfs.spectra.detectors import NANOMETRES, illuminant, sensitivities, visible_mean
 
 Array = NDArray[np.float64]
 ANGLES = np.radians(np.arange(0.0, 89.1, 1.0))  # up to grazing incidence, where nothing passes
-VISIBLE = illuminant("D65") * sensitivities()[0]  # weights of visible light [N]
 PATCH_ANGLES = 32  # angles of incidence in each patch, for its mean
 
 
@@ -59,7 +58,7 @@ class SpectralFactor:
     @cached_property
     def visible(self) -> Array:
         """Transmittance [A] for D65 and V(lambda)."""
-        visible: Array = self.transmittance @ VISIBLE / VISIBLE.sum()
+        visible: Array = visible_mean(self.transmittance)
         return visible
 
     def of_angles(self, channels: Channels) -> Array:

@@ -22,12 +22,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.bsdf.spectral_factor import VISIBLE, SpectralFactor
+from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
 from mitsuba_cfs.methods.coefficients import beam_matrix
 from mitsuba_cfs.methods.phase_light import PhaseLight, beam_by_patches, sensor_light, traced_states
 from mitsuba_cfs.methods.phase_matrices import PhaseMatrices, with_exchange, with_sensors
 from mitsuba_cfs.methods.reflected_sun import SunlitRoom, beams_in_rooms, sunlit_room
 from mitsuba_cfs.spectra.channels import Channels
+from mitsuba_cfs.spectra.detectors import visible_mean
 from mitsuba_cfs.surfaces import Surfaces
 
 Array = NDArray[np.float64]
@@ -122,7 +123,7 @@ def rooms_in_bands(
         panes |= {id(one): (one.mirrored, group.area) for one in of if one.mirrored is not None}
     rows = [spectrum for spectrum, _ in panes.values()]
     bands = reflectance_bands(
-        np.array([*own, *(spectrum @ VISIBLE / VISIBLE.sum() for spectrum in rows)]),
+        np.array([*own, *map(visible_mean, rows)]),
         np.array([*by_channel, *map(channels.mean, rows)]),
         np.array([*area, *(size for _, size in panes.values())]),
         channels,

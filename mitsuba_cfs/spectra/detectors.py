@@ -66,6 +66,13 @@ def illuminant(name: str) -> FloatArray:
     return power
 
 
+def visible_mean(spectra: ArrayLike) -> FloatArray:
+    """Transmittance or reflectance of visible light [..] of spectra [.., N]; source: EN 410, by D65."""
+    weights = illuminant("D65") * sensitivities()[0]
+    mean: FloatArray = np.asarray(spectra, dtype=float) @ weights / weights.sum()
+    return mean
+
+
 def detected(spectrum: ArrayLike) -> FloatArray:
     """What `DETECTORS` receive of spectra [.., N]: [.., 9], photopic in lm, the others in W."""
     received = np.asarray(spectrum, dtype=float) @ sensitivities().T

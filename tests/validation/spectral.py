@@ -28,14 +28,7 @@ from mitsuba_cfs.methods.spectral_light import Detection, spectral_light
 from mitsuba_cfs.sky.annual import AnnualSky, given_sky
 from mitsuba_cfs.spectra.channels import Channels
 from mitsuba_cfs.spectra.daylight import OVERCAST_K, daylight_components, daylight_shares, sun_spectra
-from mitsuba_cfs.spectra.detectors import (
-    NANOMETRES,
-    colour_temperature,
-    detected,
-    equivalent_daylight,
-    illuminant,
-    sensitivities,
-)
+from mitsuba_cfs.spectra.detectors import NANOMETRES, colour_temperature, detected, equivalent_daylight, visible_mean
 from mitsuba_cfs.surfaces import Surfaces
 from tests.radiance import polygon, run
 
@@ -55,7 +48,6 @@ SKY_AND_GROUND = (
 ALTITUDE, AZIMUTH = 35.0, 170.0  # of the sun [degrees], from north by east
 BANDS = 20  # of each run of the peer, whose build has at most 24
 RANGES = 4  # of 100 nm each, a run of the peer for each
-VISIBLE = illuminant("D65") * sensitivities()[0]
 # Diffuse reflectances of the room's faces that are not neutral
 ROOMS: dict[str, dict[str, NDArray[np.float64]]] = {
     "neutral": {},
@@ -135,7 +127,7 @@ def room_scene(room: str = "neutral") -> tuple[DaylightScene, NDArray[np.float64
     The eye of the scene is the last of the points.
     """
     colours = ROOMS[room]
-    visible = {side: float(spectrum @ VISIBLE / VISIBLE.sum()) for side, spectrum in colours.items()}
+    visible = {side: float(visible_mean(spectrum)) for side, spectrum in colours.items()}
     space = shoebox(reflectance=visible).spaces[0]
     spectra = [colours.get(face.name, np.full(len(NANOMETRES), face.reflectance("visible"))) for face in space.faces]
     view = fisheye(tuple(POINTS[-1]), tuple(NORMALS[-1]), 16)
@@ -171,7 +163,7 @@ def photopic_light(window: Window, sky: AnnualSky, scene: DaylightScene) -> Phas
     table = spectral_tables(window.panes)["Visible"]
     system = BsdfOptics(specular_matrices(table), angular=table)
     if window.fabric is not None:
-        share = float(window.fabric @ VISIBLE / VISIBLE.sum())
+        share = float(visible_mean(window.fabric))
         block = np.full((KLEMS_FULL.size,) * 2, share / np.pi)
         sheet = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, block, block, block, block)
         system = BsdfOptics(combine_layers([specular_matrices(table), sheet]).bsdf)
