@@ -53,7 +53,7 @@ def _thermal(_study, *_others, **_options):
     return (room,), ()
 
 
-def _compliance(options, *_others):
+def _compliance(options, *_others, **_more):
     from scenes.comply.findings import calendar_of
     from scenes.comply.results import Compliance
     from scenes.comply.sunlight import sun_day
