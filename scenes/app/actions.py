@@ -127,7 +127,7 @@ def outdated(project: Project, name: str, journal: Sequence[Mapping[str, Any]]) 
 
     Args:
         name: the folder in `results`.
-        journal: the lines of `Project.journal`; results of a command that is not in it are none of ours.
+        journal: the lines of `Project.journal`; nothing is known of results whose command is not in it.
     """
     out = f"{RESULTS}/{name}"
     made = (one for one in reversed(journal) if one.get("state") == "done" and out in one["command"])
