@@ -642,31 +642,30 @@ class Check:
 
 def glare_words(options: ComplyOptions, *, shaded: bool) -> str:
     """How glare is rated; `shaded`: with real blinds."""
-    blinds = Note("blinds closed by the rule of LM-83") if shaded else Note("all blinds open")
     seats = Note("one seat in the middle of each room")
     if options.grid is not None:
         seats = Note("seats spaced {distance:g} m", distance=options.grid)
-    start, end = options.room.occupancy.hours
     return Note(
         "Glare is rated with {blinds}, {seats}, daily from {start} to {end} o'clock, with pictures of {pixels} pixels.",
-        blinds=blinds,
         seats=seats,
-        start=start,
-        end=end,
         pixels=options.room.outputs.picture_size,
+        **_blinds_and_hours(options, shaded=shaded),
     )
 
 
 def eye_words(options: ComplyOptions, *, shaded: bool) -> str:
     """Whose light at the eye is judged."""
-    blinds = Note("blinds closed by the rule of LM-83") if shaded else Note("all blinds open")
-    start, end = options.room.occupancy.hours
     return Note(
         "Light at the eye is that of one view in each room, with {blinds}, daily from {start} to {end} o'clock.",
-        blinds=blinds,
-        start=start,
-        end=end,
+        **_blinds_and_hours(options, shaded=shaded),
     )
+
+
+def _blinds_and_hours(options: ComplyOptions, *, shaded: bool) -> dict[str, object]:
+    """In which state of the blinds and in which hours the view of an eye is judged."""
+    start, end = options.room.occupancy.hours
+    blinds = Note("blinds closed by the rule of LM-83") if shaded else Note("all blinds open")
+    return {"blinds": blinds, "start": start, "end": end}
 
 
 def light_words(room: RoomOptions) -> str:
