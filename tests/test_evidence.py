@@ -39,7 +39,7 @@ NO_EVIDENCE = {
     "studies.md": {"| in the folder | what |", "| event | what is done |"},
     "pv.md": {"| key | meaning |"},
 }
-ONCE = {"benchmarks.md", "reliability.md"}  # pages that say it once, for all of their tables
+ONCE = {"benchmarks.md", "evidence_reliability.md", "reliability.md"}  # pages that say it once, for all of their tables
 
 
 def tables(page: str) -> list[tuple[str, str]]:
