@@ -90,6 +90,8 @@ def _error(room: RoomYear, card: Card) -> str:
         return card.error
     if card.unit == "DGP":
         worst = max(room.glare.pictures, key=lambda picture: picture.glare["dgp"])
+        if worst.glare["dgp"] >= 1.0:
+            return gettext("none: DGP ends at 1")
         return plus_minus(worst).strip() or gettext("unknown")
     if card.traced:
         light = float(np.mean(room.daylight.relative_error))
@@ -98,9 +100,9 @@ def _error(room: RoomYear, card: Card) -> str:
 
 
 def plus_minus(picture: LuminancePicture) -> str:
-    """The standard error of a picture's DGP; empty where it is not known."""
+    """The standard error of a picture's DGP; empty where it is not known, or where DGP is limited to 1."""
     error = picture.glare.get("dgp_standard_error", float("nan"))
-    return "" if error != error else f" {dgp_error(error)}"
+    return "" if error != error or picture.glare["dgp"] >= 1.0 else f" {dgp_error(error)}"
 
 
 MOST_NAMES = 4  # of systems in the first sentence, of rooms in that on shading

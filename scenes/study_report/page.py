@@ -270,7 +270,7 @@ def _filled(study: StudyResult, page: PageOptions, done: Sequence[tuple[int, Cas
             left_out=len(done) - len(pages),
             model=study_model(study),
             has_outdoors=any(b.elements for b, _ in study.plan.rooms.values()),
-            problems=tables.issues_table(study.issues),
+            problems=tables.problems_table(study.issues),
             inputs=inputs_table(study),
             mean_error=share(sum(errors) / len(errors) / 100),
             worst_error=share(worst / 100),

@@ -44,6 +44,16 @@ def test_glare_names_its_hour_its_sun_and_its_cause(result) -> None:
     assert text.startswith("Glare is imperceptible in all pictures; the highest DGP is 0.30")
 
 
+def test_a_dgp_at_the_end_of_its_scale_has_no_error_and_a_small_error_no_digits(result) -> None:
+    limited = _with_glare(result, dgp=1.0, ev=15000.0, dgp_standard_error=0.0001)
+    assert "DGP 1.00 (" in said(limited, "Glare")
+    shown = verdict(limited, [cards(limited, room) for room in limited.spaces]).limits.shown
+    (row,) = [row for row in shown.rows if row[1] == "Highest glare"]
+    assert row[4] == "none: DGP ends at 1"
+    small = _with_glare(result, dgp=0.5, ev=5000.0, dgp_standard_error=0.0001)
+    assert "DGP 0.50 ± less than 0.001 (" in said(small, "Glare")
+
+
 def test_warmth_counts_the_hours_of_the_warmest_room(result) -> None:
     text = said(result, "Overheating")
     counts = []
