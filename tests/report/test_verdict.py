@@ -7,12 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mitsuba_cfs.notes import Note
+from scenes.head import NO_HEAD
 from scenes.language.numbers import percent
 from scenes.report.headline import cards
 from scenes.report.page import report_html
 from scenes.report.verdict import verdict
 from tests.report.building_page import building
 from tests.report.synthetic import run_result
+from thermal.gvalue import thermal_data
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +71,16 @@ def test_warmth_counts_the_hours_of_the_warmest_room(result) -> None:
     cold = room.heat.temperatures.assign(operative_c=20.0)
     one = replace(room, heat=replace(room.heat, temperatures=cold))
     assert said(replace(result, spaces=(one,)), "Overheating").startswith("No occupied hour exceeds 26")
+
+
+def test_assumed_thermal_values_stand_beside_the_temperatures(result) -> None:
+    """The notes are those of the thermal model itself, as a run's head has them."""
+    named = []
+    for known in ({}, {"u_value": 1.1}, {"u_value": 1.1, "g_normal": 0.6}):
+        data = thermal_data([0.47], [0.2], item="Blind", **known)
+        head = replace(NO_HEAD, assumed=tuple(Note(one.template, **one.values) for one in data.assumptions))
+        named.append("assumed U- or g-values: Blind." in said(replace(result, head=head), "Overheating"))
+    assert named == [True, True, False]
 
 
 def test_of_rooms_warm_in_every_hour_the_hottest_is_named(result) -> None:
