@@ -281,3 +281,23 @@ def with_realised_films(
         emissivity_in=plain.emissivity_in,
         emissivity_out=plain.emissivity_out,
     )
+
+
+def with_u_value(system: Fenestration, u_value: float) -> Fenestration:
+    """A system of another U-value: the resistance of its panes is changed at all temperatures.
+
+    The change is that of 1 / U at the measuring condition; films, gaps beside a shade and closures stay.
+    """
+    change = 1.0 / u_value - 1.0 / system.u_value
+    resistance = None if system.resistance is None else _with_added(system.resistance, change)
+    shade = system.shade
+    if shade is not None:
+        shade = replace(shade, panes=_with_added(shade.panes, change), two_layers=_with_added(shade.two_layers, change))
+    return replace(system, u_value=u_value, resistance=resistance, shade=shade)
+
+
+def _with_added(resistance: LayerResistance, change: float) -> LayerResistance:
+    """A resistance with so much more [m2 K/W] at 10 degC without a difference."""
+    first, *others = resistance.coefficients
+    first = first + change if resistance.kind == "constant" else 1.0 / (1.0 / first + change)
+    return LayerResistance(resistance.kind, (first, *others))
