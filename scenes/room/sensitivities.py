@@ -27,10 +27,10 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.results import MELANOPIC_BY_DAY, DaylightResult, SpectralYear
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
-from scenes.room.zone import RoomZone, balances, climate, lamp_daylight, lamp_power
+from scenes.room.zone import RoomZone, balances, climate, lamp_daylight, lamp_power, per_window
 from scenes.uncertain_inputs import INPUTS
 from thermal.balance import ZoneResult
-from thermal.blackbox import with_u_value
+from thermal.blackbox import absorbed_at_u, with_u_value
 from thermal.comfort import comfort_by_outdoors, degree_hours
 from thermal.zone import Gains
 
@@ -322,11 +322,19 @@ def _zone(room: RoomZone, **changes: Any) -> RoomZone:
 
 
 def _with_u(room: RoomZone, by: float) -> RoomZone:
-    windows = tuple(
-        replace(window, states=tuple(with_u_value(one, one.u_value + by) for one in window.states))
-        for window in room.zone.windows
-    )
-    return _zone(room, windows=windows)
+    solar, windows = room.solar, []
+    outer, inner = (np.array(values, dtype=float) for values in (solar.absorbed_outer, solar.absorbed_inner))
+    for number, window in enumerate(room.zone.windows):
+        moved = tuple(with_u_value(one, one.u_value + by) for one in window.states)
+        state, states = np.zeros(len(outer), dtype=np.int64), per_window(solar, room.zone).state
+        if states is not None:
+            state = np.repeat(states[:, number], len(outer) // len(states))
+        for j, (one, other) in enumerate(zip(window.states, moved, strict=True)):
+            rows = np.flatnonzero(state == j), number
+            outer[rows], inner[rows] = absorbed_at_u(one, other, outer[rows], inner[rows])
+        windows.append(replace(window, states=moved))
+    changed = replace(room, solar=replace(solar, absorbed_outer=outer, absorbed_inner=inner))
+    return _zone(changed, windows=tuple(windows))
 
 
 def _with_gains(room: RoomZone, by: float) -> RoomZone:

