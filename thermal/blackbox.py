@@ -321,3 +321,50 @@ def with_realised_films(
         emissivity_in=plain.emissivity_in,
         emissivity_out=plain.emissivity_out,
     )
+
+
+def absorbed_at_u(
+    system: Fenestration, moved: Fenestration, outer: NDArray[np.float64], inner: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Sun absorbed in the two layers of a system of another U: as much in all, and as much of it indoors.
+
+    g stays, as where a system is modelled from g and another U.  With a shade of its own: as it was.
+    """
+    if system.shade is not None or moved.shade is not None:
+        return outer, inner
+    (of_outer, _, of_inner), (to_outer, _, to_inner) = system.inward_shares(), moved.inward_shares()
+    whole = outer + inner
+    inwards = of_outer * outer + of_inner * inner
+    changed = np.clip((inwards - to_outer * whole) / (to_inner - to_outer), 0.0, whole)
+    return whole - changed, changed
+
+
+MEASURED_DIFFERENCE = 15.0  # of the air on both sides, EN 673:2011 [K]
+
+
+def with_u_value(system: Fenestration, u_value: float) -> Fenestration:
+    """A system of another U-value: the resistance of its panes is changed at all temperatures.
+
+    The change is that of 1 / U at the measuring condition; films, gaps beside a shade and closures stay.
+    """
+    change = 1.0 / u_value - 1.0 / system.u_value
+    between = MEASURED_DIFFERENCE * (1.0 - system.u_value * (system.r_outer + system.r_inner))
+    shade, resistance = system.shade, system.resistance
+    if resistance is not None:
+        resistance = _with_added(resistance, change, between)
+    if shade is not None:
+        panes, both = (_with_added(one, change, between) for one in (shade.panes, shade.two_layers))
+        shade = replace(shade, panes=panes, two_layers=both)
+    return replace(system, u_value=u_value, resistance=resistance, shade=shade)
+
+
+def _with_added(resistance: LayerResistance, change: float, difference: float) -> LayerResistance:
+    """A resistance with so much more [m2 K/W] at 10 degC and a difference, and in proportion elsewhere."""
+    first, *others = resistance.coefficients
+    if resistance.kind == "linear U":
+        moved = 1.0 / (1.0 / first + change)
+        return LayerResistance(resistance.kind, (moved, others[0] * moved / first, others[1]))
+    nominal = float(resistance.at(10.0, difference))
+    factor = (nominal + change) / nominal
+    power = 1 if resistance.kind == "constant" else -1  # the others are conductances
+    return LayerResistance(resistance.kind, tuple(c * factor**power for c in resistance.coefficients))
