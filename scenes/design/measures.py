@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
@@ -17,15 +17,12 @@ from scenes.comply.rules import LevelTable, read_rule
 from scenes.language.catalogue import N_
 from scenes.study.store import CaseResult
 
-if TYPE_CHECKING:
-    from scenes.design.design_file import DesignSystem
-
 GOALS = {"least": 1.0, "most": -1.0}  # what makes the least the best
 ENERGIES = ("heating_kwh", "cooling_kwh", "lighting_kwh")
 OF_AREA = {0.5: "en17037_target_lx", 0.95: "en17037_minimum_lx"}  # column of a case, by share of the area
 WHOLE_TIME = 0.5  # of these columns: half of the daylight hours
 ROUNDING = 1e-9  # of a value beside its limit
-Value = Callable[[CaseResult, Space, "DesignSystem | None"], float]
+Value = Callable[[CaseResult, Space, Any], float]  # of a case, its room and its `DesignSystem`
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +77,7 @@ def _column(name: str) -> Value:
 def _of_windows(name: str) -> Value:
     """A number of the user's per m2 of window, for all windows of the room."""
 
-    def value(_: CaseResult, space: Space, system: DesignSystem | None) -> float:
+    def value(_: CaseResult, space: Space, system: Any) -> float:
         per_m2 = getattr(system, name)
         if per_m2 is None:
             raise ValueError(f"{name} of a system that states none")

@@ -139,13 +139,13 @@ def certainty(result: DesignResult) -> tuple[str, ...]:
         )
         lines.append(text)
     if apart and not any(apart):
-        lines.append(gettext("The two cannot be told apart: more rays, or another reason, must decide."))
+        lines.append(gettext("The two are equal within these errors: more rays, or another reason, must decide."))
     count = result.design.search.repeats + 1
     lines.append(
         gettext(
-            "Standard errors are those of ray tracing, from {count} computations with different seeds; those of the "
-            "inputs are not in them.",
-            count=count,
+            "Standard errors are those of ray tracing (the two were computed {times} times, with different seeds); "
+            "those of the inputs are not in them.",
+            times=count,
         )
     )
     close = [one for one in best.limits if one.met and _room(one) < 0.05]
@@ -277,7 +277,7 @@ def _searched(result: DesignResult) -> tuple[str, ...]:
     failed = sum(bool(one.error) for one in result.searched)
     lines = [
         gettext(
-            "{count} candidates were computed in the search ({method}; seed {seed}).",
+            "Candidates computed in the search: {count} ({method}; seed {seed}).",
             count=len(result.searched),
             method=methods[asked.method],
             seed=asked.seed,
@@ -285,9 +285,9 @@ def _searched(result: DesignResult) -> tuple[str, ...]:
         gettext("The search used the study's own method.")
         if not asked.quick
         else gettext(
-            "The search used the three-phase method with few rays and sDGP; the {count} best, and the best of each "
+            "The search used the three-phase method with few rays and sDGP; the {number} best, and the best of each "
             "system, were computed again by the study's own method. All figures in the answer are of the latter.",
-            count=asked.front,
+            number=asked.front,
         ),
         gettext(
             "Best is, of the candidates that meet every limit and that no other surpasses in every objective, the one "

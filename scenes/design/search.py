@@ -238,7 +238,7 @@ def _next(
     objectives = np.array([one.objectives for one in outcomes])
     limits = np.array([one.limits for one in outcomes]).reshape(len(outcomes), -1)
     value, name = _one_objective(objectives, draw)
-    order = np.lexsort((value, [one.violation for one in outcomes]))
+    order = np.lexsort((value, np.array([one.violation for one in outcomes])))
     others = _others(space, [points[number] for number in order[:BEST]], taken, draw)
     met = (limits <= 0).all(axis=1)
     if not met.any():  # first the least that limits are missed by
