@@ -423,10 +423,12 @@ def timings_table(result: RunResult) -> tables.Table:
 
 def remaining(manifest: Mapping) -> dict[str, Any]:
     """What the manifest holds besides the parts shown in tables of their own."""
-    tables_of_their_own = ("inputs", "options", "versions", "seconds", "rooms")
+    tables_of_their_own = ("inputs", "options", "seed", "versions", "seconds", "rooms", "folders")
     at_the_head = ("quick", "head", "fenestration", "building", "site", "system")
     shown = (*tables_of_their_own, *at_the_head)
-    return {key: value for key, value in manifest.items() if key not in shown and value not in ([], None)}
+    names = {"variant": gettext("Mitsuba variant"), "weather_notes": gettext("Notes on the weather")}
+    rest = {key: value for key, value in manifest.items() if key not in shown and value not in ([], None)}
+    return {names.get(key, key): value for key, value in rest.items()}
 
 
 def _named(manifest: Mapping, name: str) -> str:
