@@ -21,7 +21,7 @@ from mitsuba_cfs.files import json_text, write_text
 from scenes.figures.plan import plan_frame, window_from_above
 from scenes.head import Head
 from scenes.language.catalogue import N_, gettext, in_language, ngettext, translated
-from scenes.language.numbers import cell, day_and_month, rounded, semicolons
+from scenes.language.numbers import cell, colon, day_and_month, rounded, semicolons
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import tables
@@ -269,8 +269,14 @@ def environment(own: Mapping[str, str] | None = None) -> jinja2.Environment:
     environment.filters["script_json"] = script_json
     environment.filters["packed_json"] = packed_json
     environment.filters["tied"] = tied
+    environment.filters["headed"] = headed
     environment.install_gettext_callables(gettext, ngettext)
     return environment
+
+
+def headed(text: object) -> str:
+    """A heading with the page's colon after it."""
+    return colon(str(text), "").rstrip(" ")
 
 
 def tied(text: str) -> Markup:
