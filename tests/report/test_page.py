@@ -122,7 +122,7 @@ def test_account_stands_in_the_head_and_alike_issues_once(result) -> None:
     assert "9.0 of 20.0 m² of exterior glass used" in head
     assert "not usable: only 45 % of the exterior glass is used" in head
     assert "3 of 4 spaces" in head and "A gym" in head
-    assert "19 times: wall 0: its body is no closed solid" in rest and "wall 7: its" not in rest
+    assert "19 times: wall 0: its body is not a closed solid" in rest and "wall 7: its" not in rest
     assert rest.index("no room behind it") < rest.index("19 times")
 
 
