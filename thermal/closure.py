@@ -151,10 +151,12 @@ class Closure:
             return closed
         return with_realised_films(closed, r_inner_realised=films[0], r_outer_realised=films[1])
 
-    def described(self, place: str, *, g_by_direction: bool = False) -> ThermalNote:
+    def described(self, place: str, *, g_by_direction: bool = False, stated: bool = True) -> ThermalNote:
         """The closure in words, and the error to expect.
 
-        Args: g_by_direction: g is stated by direction, not at normal incidence alone.
+        Args:
+            g_by_direction: g is stated by direction, not at normal incidence alone.
+            stated: U, g and the shade's position are, as in the cases with the known error.
         """
         words = {
             "typical": ThermalNote("ISO 15099 with typical layers"),
@@ -172,6 +174,11 @@ class Closure:
         known = ERRORS.get(place, {}).get(key)
         if known is None:
             return ThermalNote("{model}; error unknown", {"model": words})
+        if not stated and key != "layers":
+            return ThermalNote(
+                "{model}; error unknown: it was compared with EnergyPlus from stated U, g and position of the shade",
+                {"model": words},
+            )
         return ThermalNote(
             "{model}; RMS error against EnergyPlus in {cases} cases of low-e double glazing, "
             "{inputs}: air {air:.2f} K, glass {glass:.2f} K",
