@@ -56,6 +56,7 @@ RANKS = {
         {"comply", "heat", "calibration", "picture_files", "photovoltaics", "simulation", "year_of_glare"},
         {"study", "view_picture"},
         {"study_report"},
+        {"design"},
         {"app"},
         {"commands"},
         {"cli"},

@@ -24,6 +24,7 @@ from scenes.room.options import GLARE_SOURCES, GLARE_SUN, Outputs, SensorGrid
 if TYPE_CHECKING:
     from scenes.head import Head
     from scenes.heat.study_file import StudyFile
+    from scenes.language.catalogue import Language
     from scenes.study.study_file import Study as Grid
 
 
@@ -302,7 +303,7 @@ def _keep_language(context: click.Context, _: click.Parameter, value: str | None
     context.meta[LANGUAGE] = value
 
 
-def chosen_language() -> str | None:
+def chosen_language() -> Language | None:
     """The language of `--language`; None where it is not given."""
     return click.get_current_context().meta.get(LANGUAGE)
 

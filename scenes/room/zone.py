@@ -234,7 +234,7 @@ def _heated(zone: Zone, faces: Sequence[Sequence[Face]], hours: OperationHours, 
 
 FloatArray = NDArray[np.float64]
 SKY_SAMPLES = 4096  # rays from each surface and window to the sky
-COMPILING = "compiling the heat balance, once: about 10 s"
+COMPILING = "compiling the heat balance, once: about half a minute"
 RADIANT_SHARE = 0.5  # of the heat of people and equipment
 PERSON_VAPOUR = 50.0 / 3.6e6  # of a person at a desk [kg/s]
 
