@@ -118,3 +118,11 @@ def test_a_wrong_deviation_is_refused(tmp_path):
     path.write_text("[bands]\ng_value = -0.1\n", "utf-8")
     with pytest.raises(DataError, match=r"bands\.g_value"):
         read_operation(path)
+
+
+def test_a_study_has_columns_of_bands(year):
+    from scenes.study.one_case import room_figures
+
+    figures, _ = room_figures(year)
+    assert figures["da300_p5"] <= figures["da300_median"] <= figures["da300_p95"]
+    assert 0 <= figures["lm83_accepted_met_percent"] <= 100
