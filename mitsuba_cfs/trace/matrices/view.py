@@ -497,6 +497,7 @@ def views_of_rooms(
     rooms: Sequence[TracedRoom],
     *,
     with_direct: bool = False,
+    direct: NDArray[np.float64] | None = None,
     basis: KlemsBasis = KLEMS_FULL,
     samples: int = 4096,
     max_depth: int = 32,
@@ -511,7 +512,9 @@ def views_of_rooms(
     The random numbers of a room do not depend on the other rooms: each matrix is that of the room
     alone but for the rounding of coordinates.
 
-    Args: with_direct: the matrices with a depth of 1 besides, entry by entry a part of the others.
+    Args:
+        with_direct: the matrices with a depth of 1 besides, entry by entry a part of the others.
+        direct: those [S, G, K] of a single room, where they are known: they are not traced again.
     """
     n, scenes = int(samples), SceneCache() if scenes is None else scenes
     bins, depths = DirectionBins(basis), (max_depth, 1) if with_direct else (max_depth,)
@@ -536,7 +539,7 @@ def views_of_rooms(
 
     def traced(some: Sequence[int]) -> Callable[[int], NDArray[np.float64]]:
         placed, tracer = scenes.together([rooms[i] for i in some])
-        return _batches(_Sensors.of(tracer, bins, placed), n, depths, seed)
+        return _batches(_Sensors.of(tracer, bins, placed), n, depths, seed, direct)
 
     estimates = of_rooms(
         rooms,
@@ -552,10 +555,12 @@ def views_of_rooms(
     return list(zip(estimates[:count], estimates[count:] or [None] * count, strict=True))
 
 
-def _batches(of: _Sensors, samples: int, depths: Sequence[int], seed: int) -> Callable[[int], NDArray[np.float64]]:
+def _batches(
+    of: _Sensors, samples: int, depths: Sequence[int], seed: int, known: NDArray[np.float64] | None
+) -> Callable[[int], NDArray[np.float64]]:
     """Batches of the rows of all rooms [S * G of each, K], those of each depth.
 
-    Args: depths: most bounces; a second one is 1.
+    Args: depths: most bounces; a second one is 1.  known: those of a depth of 1, which are not traced.
     """
     max_depth = depths[0]
     most = int(of.counts.max())
@@ -566,11 +571,14 @@ def _batches(of: _Sensors, samples: int, depths: Sequence[int], seed: int) -> Ca
     def batch(number: int) -> NDArray[np.float64]:
         matrix = empty_sums(int(of.entries[-1]))
         key = batch_key(seed, number)
-        _add_direct(of, matrix, samples=samples, key=key)
+        if known is None:
+            _add_direct(of, matrix, samples=samples, key=key)
         direct = [] if len(depths) == 1 else [np.array(sums_of(matrix, (int(of.entries[-1]),)))]
         if of.tracer.gloss is not None and max_depth > 1:
             _add_mirrored(of, matrix, samples=samples, max_depth=max_depth, key=key)
         values = sums_of(matrix, (int(of.entries[-1]),))
+        if known is not None:
+            values = values + known.ravel()
         for launch in _launches(of, blocks) if blocks else ():
             added = indirect_rows(of, launch, max_depth=max_depth, key=key)
             for block, rows in zip(launch, added, strict=True):

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import drjit as dr
 import mitsuba as mi
@@ -26,7 +27,7 @@ from scipy import sparse
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, tables
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_faces
-from mitsuba_cfs.trace.sun.sunlit_cells import RAYS, Beam, RoomCells, surface_cells
+from mitsuba_cfs.trace.sun.sunlit_cells import RAYS, RoomCells, surface_cells
 
 CELL_RAYS = 128  # from each cell, in each batch, at most
 CELL_LEAST = 32  # and at the least: fewer take as long
@@ -71,86 +72,99 @@ def room_cells(inside: TracedScene, *, samples: int = CELL_RAYS * CELL_SHARE) ->
 
 def room_shares(
     cells: tuple[RoomCells, ReflectingCells],
-    inside: TracedScene,
+    rooms: Sequence[TracedScene],
     sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
     *,
     samples: int,
     seed: int = 0,
-) -> NDArray[np.float64]:
-    """Illuminance of sensors by reflection of a unit luminous flux on each cell [S, c] [1/m2].
+) -> list[NDArray[np.float64]]:
+    """Illuminance of sensors by reflection of a unit luminous flux on each cell, in each room [S, c] [1/m2].
 
     Args:
+        rooms: of one shape, with reflectances of their own; all have the same rays.
         sensors: positions and normals [S, 3].
         samples: rays of each sensor.
     """
     points, normals = (np.atleast_2d(v) for v in sensors)
-    local = SurfacePoints((points - inside.centre).astype(np.float32), normals.astype(np.float32))
+    local = SurfacePoints((points - rooms[0].centre).astype(np.float32), normals.astype(np.float32))
     narrow, wide = cells[0], cells[1].cells
     every = np.arange(local.size)
-    first = _reflected(narrow, inside, local, every, local.size, samples=samples, seed=seed ^ 0x6A09E667)
+    firsts = _reflected(narrow, rooms, local, every, local.size, samples=samples, seed=seed ^ 0x6A09E667)
     entries = np.ones(narrow.size), (np.arange(narrow.size), cells[1].of)
-    step = (first @ sparse.csr_array(entries, shape=(narrow.size, wide.size))).toarray()
-    between = _between(cells[1], inside, np.flatnonzero(step.any(axis=0)), seed)
+    joined = sparse.csr_array(entries, shape=(narrow.size, wide.size))
+    steps = [(first @ joined).toarray() for first in firsts]
+    met = np.flatnonzero(np.any([step.any(axis=0) for step in steps], axis=0))
+    shares = []
+    for first, step, between in zip(firsts, steps, _between(cells[1], rooms, met, seed), strict=True):
+        later = _reflected_again(step, between)
+        shares.append(first.toarray() / narrow.area + (later / wide.area)[:, cells[1].of])
+    return shares
+
+
+def _reflected_again(step: NDArray[np.float64], between: sparse.csr_array) -> NDArray[np.float64]:
+    """What cells have of the sensors by all later reflections [S, w], from those of the first."""
     whole, found = step.sum(), np.zeros_like(step)
     for _ in range(BOUNCES):
         step = step @ between
         found += step
         if step.sum() <= LAST * (whole + found.sum()):
             break
-    return first.toarray() / narrow.area + (found / wide.area)[:, cells[1].of]
+    return found
 
 
-def _between(wide: ReflectingCells, inside: TracedScene, met: NDArray[np.int64], seed: int) -> sparse.csr_array:
-    """What cells have of each other [w, w]: of those that some meet, and of what these meet.
+def _between(
+    wide: ReflectingCells, rooms: Sequence[TracedScene], met: NDArray[np.int64], seed: int
+) -> list[sparse.csr_array]:
+    """What cells of each room have of each other [w, w]: of those that some meet, and of what these meet.
 
     The others, most of them the backs of walls, have no part in any sensor's light.
     """
     size = wide.cells.size
-    found, known = sparse.csr_array((size, size)), np.zeros(size, dtype=bool)
+    found, known = [sparse.csr_array((size, size)) for _ in rooms], np.zeros(size, dtype=bool)
     while len(met):
         known[met] = True
-        found = found + _reflected(wide.cells, inside, wide.starts, met, size, samples=wide.rays, seed=seed)
+        added = _reflected(wide.cells, rooms, wide.starts, met, size, samples=wide.rays, seed=seed)
+        found = [one + more for one, more in zip(found, added, strict=True)]
         others = np.zeros(size, dtype=bool)
-        others[found.indices] = True
+        for one in added:
+            others[one.indices] = True
         met = np.flatnonzero(others & ~known)
     return found
 
 
 def room_light(
-    cells: RoomCells,
-    shares: Sequence[NDArray[np.float64]],
-    beam: Beam,
-    suns: tuple[NDArray[np.float64], NDArray[np.float64]],
+    shares: Sequence[NDArray[np.float64]], flux: sparse.csr_array, strength: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]:
     """Illuminance of sensors by what the room reflects of a group's straight beam [B][S, h].
 
     Args:
         shares: [B][S, c] of `room_shares`, one for each seed of the beam.
-        suns: [h, 3] directions, and [h] illuminance normal to them.
+        flux: [c, B * h] of the `Beam`.
+        strength: [h] illuminance normal to the sun.
     """
-    (towards, strength), count = suns, len(suns[0])
-    flux = beam.flux(cells, towards)
-    parts = (flux[:, b * count : (b + 1) * count] for b in range(len(beam.seeds)))
+    count = len(strength)
+    parts = (flux[:, b * count : (b + 1) * count] for b in range(len(shares)))
     return [(share @ part) * strength for share, part in zip(shares, parts, strict=True)]
 
 
 def _reflected(
     cells: RoomCells,
-    inside: TracedScene,
+    rooms: Sequence[TracedScene],
     starts: SurfacePoints,
     rows: NDArray[np.int64],
     count: int,
     *,
     samples: int,
     seed: int,
-) -> sparse.csr_array:
-    """Irradiance of rows by a unit of irradiance on each cell that their rays meet [count, c].
+) -> list[sparse.csr_array]:
+    """Irradiance of rows by a unit of irradiance on each cell that their rays meet, in each room [count, c].
 
     Args:
         starts: [count * n] places that the rays of each row start from, in turn.
         rows: those that rays are sent from; the others are empty.
     """
-    n, found = starts.size // max(count, 1), sparse.csr_array((count, cells.size))
+    inside, found = rooms[0], [sparse.csr_array((count, cells.size)) for _ in rooms]
+    n = starts.size // max(count, 1)
     block, key = max(1, RAYS // samples), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
     points, normals = starts.points(), starts.normals()
     for begin in range(0, len(rows), block):
@@ -166,11 +180,12 @@ def _reflected(
         way = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
         hit = inside.scene.ray_intersect_preliminary(mi.Ray3f(point, way), coherent=False)
         met = hit.is_valid()
-        rho = inside.whole(hit.prim_index, way, met)
-        met &= rho > 0
-        cell = cells.of(*hit_faces(inside, point, way, hit, met), met)
-        cell, rho = tables(cell, rho)
+        reflected = [room.whole(hit.prim_index, way, met) for room in rooms]
+        met &= reduce(dr.maximum, reflected) > 0
+        cell, *reflected = tables(cells.of(*hit_faces(inside, point, way, hit, met), met), *reflected)
         kept = np.flatnonzero(cell >= 0)
-        entries = rho[kept].astype(float) / samples, (some[kept // samples], cell[kept])
-        found = found + sparse.csr_array(sparse.coo_array(entries, shape=found.shape))
+        places = some[kept // samples], cell[kept]
+        for q, rho in enumerate(reflected):
+            entries = rho[kept].astype(float) / samples, places
+            found[q] = found[q] + sparse.csr_array(sparse.coo_array(entries, shape=found[q].shape))
     return found
