@@ -1,5 +1,7 @@
 """The names of `import scenes`, and the modules that they come from."""
 
+from .design.design import DesignResult as DesignResult, run_design as run_design
+from .design.design_file import Design as Design, read_design as read_design
 from .input_files import read_building as read_building
 from .fenestration.systems import FenestrationSystem as FenestrationSystem, read_system as read_system
 from .fenestration.tilts import tilt_states as tilt_states

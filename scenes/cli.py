@@ -80,6 +80,7 @@ COMMANDS = {
     "dgp": "Compute the glare of views in a room for every hour of the year.",
     "thermal": "Compute hourly gains, temperatures, loads and comfort of rooms (heat only).",
     "study": "Compare rooms, systems, orientations and climates of a study file.",
+    "design": "Search the best system, sizes and rule of control for a room.",
     "pv": "Compute the yield of the photovoltaic modules of a building.",
     "calibrate": "Measure the computing time of each method on this machine.",
 }

@@ -36,6 +36,7 @@ RunSection = Literal[
     "glossary",
 ]
 StudySection = Literal["verdict", "comparison", "model", "problems", "method", "inputs", "glossary"]
+DesignSection = Literal["candidates", "search", "inputs"]
 DossierSection = Literal["rooms", "problems", "sources"]
 GlareSection = Literal["worst", "seats", "views"]
 

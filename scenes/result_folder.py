@@ -24,6 +24,7 @@ RENAMED = {"ifc export": "export"}  # commands by their earlier names, which mar
 EXPLORER = "explore"  # folder of the explorer, inside that of the results
 REPORT, FIRST_PLAN = "report.html", "first_plan.csv"
 CASES = "cases"  # folder of the finished cases of a study, inside that of its results
+SYSTEMS = "systems"  # folder of the systems that a design made, inside that of its results
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,7 +276,7 @@ def remove_results(folder: Path) -> None:
         raise DataError("another run of cfs is writing there: wait for it", file=folder)
     try:
         _remove(place, mark.files)
-        for one in (place / CASES, place / EXPLORER):
+        for one in (place / CASES, place / EXPLORER, place / SYSTEMS):
             if one.is_dir() and not one.is_symlink():
                 shutil.rmtree(one)
         if any(one.name != MARK for one in place.iterdir()):

@@ -77,7 +77,9 @@ def _keys() -> Iterator[Capability]:
             importlib.import_module(found.name)
     models = {one for one in _subclasses(BaseModel) if one.__module__.startswith("scenes.")}
     models = {one for one in models if "[" not in one.__name__}
-    models = {one for one in models if all("[" in sub.__name__ for sub in one.__subclasses__())}
+    face = set(importlib.import_module("scenes").__all__)  # `Study`, which `Design` extends
+    leaves = {one for one in models if all("[" in sub.__name__ for sub in one.__subclasses__())}
+    models = leaves | {one for one in models if one.__name__ in face}
     inner = {
         held
         for one in models

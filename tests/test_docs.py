@@ -126,6 +126,16 @@ def test_study_files_in_the_docs_are_read(folder):
     assert found
 
 
+def test_the_design_file_in_the_docs_is_read(folder):
+    from scenes.design.candidates import check_variables
+    from scenes.design.design_file import read_design
+
+    (code,) = examples(REPOSITORY / "docs" / "design.md", "toml")
+    shutil.copy(WEATHER.with_name("loads.toml"), folder)
+    (folder / "design.toml").write_text(code)
+    check_variables(read_design(folder / "design.toml"), folder)
+
+
 def test_the_system_and_operation_files_of_the_quick_start_are_read(folder):
     from scenes.fenestration.thermal_file import ThermalFile
     from scenes.room.operation_tables import OperationTables
@@ -142,7 +152,7 @@ def test_the_system_and_operation_files_of_the_quick_start_are_read(folder):
 
 
 def test_the_page_of_the_quick_start_is_read(folder):
-    from scenes.page_options import DossierSection, GlareSection, RunSection, StudySection, read_page
+    from scenes.page_options import DesignSection, DossierSection, GlareSection, RunSection, StudySection, read_page
 
     text = (REPOSITORY / "docs" / "quickstart.md").read_text("utf-8")
     (code,) = [c for c in examples(REPOSITORY / "docs" / "quickstart.md", "toml") if "logo" in c]
@@ -152,6 +162,7 @@ def test_the_page_of_the_quick_start_is_read(folder):
     for command, sections in (
         ("run", RunSection),
         ("study", StudySection),
+        ("design", DesignSection),
         ("comply", DossierSection),
         ("dgp", GlareSection),
     ):

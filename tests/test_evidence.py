@@ -21,6 +21,7 @@ NO_EVIDENCE = {
     "validation.md": {"| subject | judged by | page |"},
     "bsdf.md": {"| stated | by | used as | DGP |"},
     "daylight.md": {"| function | gives |"},
+    "design.md": {"| table | keys |", "| key | what varies |", "| in the folder | what |"},
     "glare.md": {"| index | of | source |", "| option | default | |", "| part of a five-phase picture | resolution |"},
     "radiance.md": {"| type | as | status | how |"},
     "thermal.md": {"| to | read |", "| closure | absorptances from | layer resistance | film resistances |"},
@@ -34,12 +35,13 @@ NO_EVIDENCE = {
         "| option | what |",
         "| rule | quantity | set-up | weather that it asks for |",
     },
+    "sensitivities.md": {"| column | content |", "| input | deviation | source |"},
     "spectral.md": {"| file | content |", "| part | spectrum |"},
     "app.md": {"| file | content | read by |"},
     "studies.md": {"| in the folder | what |", "| event | what is done |"},
     "pv.md": {"| key | meaning |"},
 }
-ONCE = {"benchmarks.md", "reliability.md"}  # pages that say it once, for all of their tables
+ONCE = {"benchmarks.md", "evidence_reliability.md", "reliability.md"}  # pages that say it once, for all of their tables
 
 
 def tables(page: str) -> list[tuple[str, str]]:

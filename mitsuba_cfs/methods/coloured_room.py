@@ -26,7 +26,7 @@ from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
 from mitsuba_cfs.methods.coefficients import beam_matrix
 from mitsuba_cfs.methods.phase_light import PhaseLight, beam_by_patches, sensor_light, traced_states
 from mitsuba_cfs.methods.phase_matrices import PhaseMatrices, with_exchange, with_sensors
-from mitsuba_cfs.methods.reflected_sun import SunlitRoom, beams_in_rooms, sunlit_rooms
+from mitsuba_cfs.methods.reflected_sun import SunlitRoom, beams_in_rooms, sunlit_room
 from mitsuba_cfs.spectra.channels import Channels
 from mitsuba_cfs.spectra.detectors import visible_mean
 from mitsuba_cfs.surfaces import Surfaces
@@ -176,7 +176,7 @@ def _with(interior: Surfaces, values: Array) -> Surfaces:
 
 def _in_band(matrices: PhaseMatrices, interior: Surfaces) -> PhaseMatrices:
     """The matrices of the same room with other reflectances: V, and W where it has been traced."""
-    scene = replace(matrices.scene, interior=interior)
+    scene = replace(matrices.scene, interior=interior, by_groups=None)
     other = with_sensors(replace(matrices, scene=scene, sensors=None, exchange=None, view=None, sunlit=None))
     return with_exchange(other, indoors=matrices.exchange is not None)
 
@@ -191,7 +191,9 @@ def _beams(
     known: dict[tuple[int, int], list[Array | None]] = {}
     shown: list[SunlitRoom | None] = []
     if sun is not None:
-        shown = sunlit_rooms(rooms, sun)
+        for one in rooms:
+            inside = one.scenes.scene(one.scene.interior, one.scene.groups)
+            shown.append(sunlit_room(one, replace(sun, inside=inside)))
     for g, of_group in enumerate(states):
         for i, j in enumerate(of_group):
             group = lit[g][j].coefficients

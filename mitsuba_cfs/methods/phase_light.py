@@ -49,7 +49,7 @@ from mitsuba_cfs.methods.reflected_sun import (
     reflected_sun,
     reflected_to_sensors,
     replaced_before,
-    sunlit_rooms,
+    sunlit_room,
 )
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.methods.window_reflection import reflects_outdoors, with_exchange_of
@@ -452,7 +452,7 @@ def _sunlit_room(light: PhaseLight, coefficients: Sequence[Sequence[GroupCoeffic
     outdoors = coefficients[: len(light.scene.outdoor_groups)]
     if light.reflected is None or not any(_passes_beam(one) for group in outdoors for one in group):
         return None
-    return sunlit_rooms([light.matrices], light.reflected)[0]
+    return sunlit_room(light.matrices, light.reflected)
 
 
 def _reflected_to_sensors(

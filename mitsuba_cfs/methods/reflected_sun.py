@@ -27,12 +27,13 @@ from mitsuba_cfs.methods.coefficients import GroupCoefficients, beam_matrix, dir
 from mitsuba_cfs.methods.phase_matrices import PhaseMatrices
 from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.surfaces import SurfaceGroups
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.reflected import Straight, outdoor_light, view_shares, window_shares
 from mitsuba_cfs.trace.sun.sunlit_cells import Beam, RoomCells
-from mitsuba_cfs.trace.sun.sunlit_sensors import room_cells, room_light, room_shares
+from mitsuba_cfs.trace.sun.sunlit_sensors import room_cells, room_light, shares_and_derivatives
 
 BATCHES = 4  # each with its own paths and points
 WINDOW_SHARE = 32  # paths of a patch for D, for each that looks for sunlit surfaces
@@ -99,22 +100,35 @@ def reflected_sun(matrices: PhaseMatrices, sky: AnnualSky) -> ReflectedSun:
     return ReflectedSun(sky, shining, inside, outside, tuple(before), by_patches)
 
 
-def sunlit_rooms(rooms: Sequence[PhaseMatrices], sun: ReflectedSun) -> list[SunlitRoom | None]:
-    """What the sensors see of the surfaces of rooms of one shape; None where these reflect nothing."""
-    some = [q for q, one in enumerate(rooms) if (one.scene.interior.reflectance > 0).any()]
-    found: list[SunlitRoom | None] = [None] * len(rooms)
-    if not some:
-        return found
-    inside = [rooms[q].scenes.scene(rooms[q].scene.interior, rooms[q].scene.groups) for q in some]
-    first, samples = rooms[0], _sensor_samples(rooms[0], ROOM_SHARE)
+def sunlit_room(matrices: PhaseMatrices, sun: ReflectedSun) -> SunlitRoom | None:
+    """What the sensors see of the room's surfaces; None where these reflect nothing."""
+    rooms = _sunlit(matrices, sun, None)
+    return rooms[0] if rooms else None
+
+
+def sunlit_derivatives(matrices: PhaseMatrices, sun: ReflectedSun, by_groups: SurfaceGroups) -> list[SunlitRoom]:
+    """The same by ln(rho) of each group of surfaces; none where the surfaces reflect nothing."""
+    return _sunlit(matrices, sun, by_groups)[1:]
+
+
+def _sunlit(matrices: PhaseMatrices, sun: ReflectedSun, by_groups: SurfaceGroups | None) -> list[SunlitRoom]:
+    interior = matrices.scene.interior
+    if not (interior.reflectance > 0).any():
+        return []
+    samples = _sensor_samples(matrices, ROOM_SHARE)
     cells = room_cells(sun.inside, samples=samples)
     batches = [
-        room_shares(cells, inside, first.scene.sensors(), samples=samples, seed=_seed(first, batch))
+        shares_and_derivatives(
+            cells,
+            sun.inside,
+            matrices.scene.sensors(),
+            samples=samples,
+            seed=_seed(matrices, batch),
+            by_groups=by_groups,
+        )
         for batch in range(BATCHES)
     ]
-    for q, *shares in zip(some, *batches, strict=True):
-        found[q] = SunlitRoom(cells[0], tuple(shares))
-    return found
+    return [SunlitRoom(cells[0], layers) for layers in zip(*batches, strict=True)]
 
 
 def reflected_to_sensors(
@@ -140,14 +154,22 @@ def beams_in_rooms(
 
     Args: rooms: None where the surfaces reflect nothing.
     """
-    some, S = [room for room in rooms if room is not None], len(matrices.scene.sensors()[0])
-    found = iter(np.zeros((len(some), S, len(sun.shining))))
-    if some:
-        stacked = [np.concatenate([room.shares[b] for room in some]) for b in range(BATCHES)]
-        light = room_light(stacked, _flux(matrices, sun, some[0].cells, group, g), sun.suns[1])
-        found = iter(np.mean(light, axis=0).reshape(len(some), S, -1))
-    dark = np.zeros((S, len(sun.sky.illuminance)))
+    some = [room for room in rooms if room is not None]
+    found = iter(np.mean(beams_by_batch(matrices, sun, some, group, g), axis=0))
+    dark = np.zeros((len(matrices.scene.sensors()[0]), len(sun.sky.illuminance)))
     return [dark if room is None else _all_hours(sun, next(found)) for room in rooms]
+
+
+def beams_by_batch(
+    matrices: PhaseMatrices, sun: ReflectedSun, rooms: Sequence[SunlitRoom], group: GroupCoefficients, g: int
+) -> Array:
+    """The same in the hours with sun, by batch [BATCHES, n, S, h]."""
+    S, h = len(matrices.scene.sensors()[0]), len(sun.shining)
+    if not rooms:
+        return np.zeros((BATCHES, 0, S, h))
+    stacked = [np.concatenate([room.shares[b] for room in rooms]) for b in range(BATCHES)]
+    light = room_light(stacked, _flux(matrices, sun, rooms[0].cells, group, g), sun.suns[1])
+    return np.stack(light).reshape(BATCHES, len(rooms), S, h)
 
 
 def _flux(

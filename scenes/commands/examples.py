@@ -10,6 +10,7 @@ EXAMPLES = {
         "cfs run house.ifc --weather city.epw --out results --quick",
         "cfs run house.ifc --weather city.epw --cfs blind.xml --u 1.1 --g 0.25 --out results",
         "cfs run house.ifc --weather city.epw --space Kitchen --annual-glare --out results",
+        "cfs run house.ifc --weather city.epw --cfs blind.xml --sensitivities --out results",
     ),
     "comply": (
         "cfs comply --list",
@@ -42,6 +43,7 @@ EXAMPLES = {
         "cfs study study.toml --out study",
         "cfs study study.toml --out study --method auto --time-budget 20min --dgp-error 10%",
     ),
+    "design": ("cfs design design.toml --out design",),
     "pv": ("cfs pv house.ifc --weather city.epw --study modules.toml --out yield",),
     "calibrate": ("cfs calibrate",),
     "ifc attach": (

@@ -24,6 +24,7 @@ from scenes.room.options import GLARE_SOURCES, GLARE_SUN, Outputs, SensorGrid
 if TYPE_CHECKING:
     from scenes.head import Head
     from scenes.heat.study_file import StudyFile
+    from scenes.language.catalogue import Language
     from scenes.study.study_file import Study as Grid
 
 
@@ -278,6 +279,11 @@ annual_glare_option = click.option("--annual-glare", is_flag=True, help="Compute
 spectral_option = click.option(
     "--spectral", is_flag=True, help="Compute melanopic illuminance and colour of the light; see docs/spectral.md."
 )
+sensitivities_option = click.option(
+    "--sensitivities",
+    is_flag=True,
+    help="Derivatives of the results by reflectances, g, U, gains and others; see docs/sensitivities.md.",
+)
 channels_option = click.option(
     "--channels",
     type=click.Choice(list(map(str, CHANNEL_SETS))),
@@ -292,7 +298,7 @@ def _keep_language(context: click.Context, _: click.Parameter, value: str | None
     context.meta[LANGUAGE] = value
 
 
-def chosen_language() -> str | None:
+def chosen_language() -> Language | None:
     """The language of `--language`; None where it is not given."""
     return click.get_current_context().meta.get(LANGUAGE)
 

@@ -131,6 +131,9 @@ class StudyPlan:
     predicted: float | None = None  # time of the cases whose method `auto` chose [s]
 
 
+RoomsOf = Callable[[RoomTable, Study], tuple[Building, list[Space]]]
+
+
 class _Read(NamedTuple):
     """Readers that read each file of a study once."""
 
@@ -138,8 +141,10 @@ class _Read(NamedTuple):
     sha256: Callable[[Path], str]
 
 
-def plan_of(study: Study) -> StudyPlan:
+def plan_of(study: Study, rooms_of: RoomsOf | None = None) -> StudyPlan:
     """The grid of a study, ordered so that neighbours share most.
+
+    Args: rooms_of: reader of the rooms of an entry, for studies of the same buildings.
 
     Raises: `DataError` for a file that cannot be read or has no such room.
     """
@@ -148,7 +153,7 @@ def plan_of(study: Study) -> StudyPlan:
     read = _Read(cache(read_operation), cache(sha256))
     _check_turning(study)
     for room in study.room:
-        building, spaces = rooms_of(room, study)
+        building, spaces = (rooms_of or read_rooms)(room, study)
         held = () if study.system else _held_files(building)
         for space in spaces:
             of_space = list(_of_space(study, room, space, held, read))
@@ -214,7 +219,7 @@ def _held_files(building: Building) -> tuple[Path, ...]:
     return tuple(file for file in (*named, *beside) if file.is_file())
 
 
-def rooms_of(room: RoomTable, study: Study) -> tuple[Building, list[Space]]:
+def read_rooms(room: RoomTable, study: Study) -> tuple[Building, list[Space]]:
     """The building of an entry and the rooms asked for."""
     building = building_or_box(room.box, study.inputs(room))
     if room.box is not None:

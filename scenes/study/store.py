@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from operator import attrgetter
@@ -55,13 +55,13 @@ class CaseResult:
 class Store:
     """A study's folder: each finished case is kept at once, tables and report come at the end."""
 
-    def __init__(self, folder: Path, *, inputs: Iterable[Path | None] = ()) -> None:
-        """Raises: `DataError` for a folder that is not a study's or cannot be written to.
+    def __init__(self, folder: Path, *, inputs: Iterable[Path | None] = (), command: str = "study") -> None:
+        """Raises: `DataError` for a folder that is not the command's or cannot be written to.
 
         Args: inputs: the study's files; the folder may not be or contain one.
         """
-        self.folder = folder
-        self._results = ResultFolder(folder, "study", inputs=inputs)
+        self.folder, self._command = folder, command
+        self._results = ResultFolder(folder, command, inputs=inputs)
 
     def open(self) -> None:
         """Make the folder, for cases to be kept in."""
@@ -79,18 +79,24 @@ class Store:
         """Keep a finished case."""
         write_bytes(self._place(result.key), result.to_bytes())
 
+    def checkpoints(self, name: str) -> Path:
+        """A folder for files that a later run uses again; it is never cleared."""
+        return self._results.checkpoints(name)
+
     def write(
         self,
         rows: Iterable[dict[str, Any]],
         manifest: dict[str, Any],
         report: Callable[[Path], object] | None = None,
         explorer: Callable[[Path], object] | None = None,
+        more: Mapping[str, Callable[[Path], object]] | None = None,
     ) -> None:
         """Write the table of all cases, what the study was made of, and its report.
 
         Args:
             report: writes it to a path; without, an earlier report goes: it tells other numbers;
-            explorer: likewise, to a folder, beside the data of its cases.
+            explorer: likewise, to a folder, beside the data of its cases;
+            more: writers of other files, by name.
         """
         import pandas as pd
 
@@ -99,7 +105,9 @@ class Store:
         with self._results.replaced() as place:
             write_table(table, place / "results.parquet", index=False)
             write_table(table, place / "results.csv", index=False, float_format="%.6g")
-            write_text(place / "study.json", text + "\n")
+            write_text(place / f"{self._command}.json", text + "\n")
+            for name, write in (more or {}).items():
+                write(place / name)
             if report is not None:
                 report(place / "report.html")
             if explorer is not None:

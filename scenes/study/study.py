@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -130,8 +130,32 @@ def run_study(
     on_head(head)
     if not isinstance(store, Store):
         store = Store(Path(store), inputs=study.files)
+    finished, reused = finished_cases(
+        plan.cases, store, processes=processes, scheduler=scheduler, compute=compute, progress=progress, on_case=on_case
+    )
+    results = tuple(finished[case.key] for case in plan.cases)
+    seconds = round(time.monotonic() - start, 3)
+    return StudyResult(study.title, plan, results, reused, seconds, study.quick, head=head)
+
+
+def finished_cases(
+    every: Sequence[Case],
+    store: Store,
+    *,
+    processes: int = 1,
+    scheduler: str | None = None,
+    compute: Compute = compute_case,
+    progress: Progress = silent,
+    on_case: Callable[[Case, CaseResult, int, int], None] | None = None,
+) -> tuple[dict[str, CaseResult], int]:
+    """The result of each case by its key, computed where the folder does not have it, and kept.
+
+    Args: as of `run_study`.
+
+    Returns: the results, and how many the folder had.
+    """
     store.open()
-    cases = {case.key: case for case in plan.cases}
+    cases = {case.key: case for case in every}
     finished = {key: result for key in cases if (result := store.load(key)) is not None}
     reused, total = len(finished), len(cases)
 
@@ -149,9 +173,7 @@ def run_study(
             under_way()
             if on_case is not None:
                 on_case(cases[result.key], result, len(finished), total)
-    results = tuple(finished[case.key] for case in plan.cases)
-    seconds = round(time.monotonic() - start, 3)
-    return StudyResult(study.title, plan, results, reused, seconds, study.quick, head=head)
+    return finished, reused
 
 
 def with_explorers(

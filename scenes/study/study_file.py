@@ -82,6 +82,11 @@ class SystemTable(_Table):
     # from Python alone: in place of the rules of its operation, see `Operation.controlled_by`
     control: Annotated[Callable[..., Any] | None, Field(exclude=True)] = None
 
+    @property
+    def has_optics(self) -> bool:
+        """Whether its optics are its own, so that its operation file has no states."""
+        return self.bsdf is not None
+
     @model_validator(mode="after")
     def _of_a_file(self) -> SystemTable:
         if self.bsdf is None and self.operation is None:
@@ -151,10 +156,10 @@ class Study(_Table, OutdoorTable):
         if not self.system and any(room.box is not None for room in self.room):
             raise ValueError("system: is missing; a box holds no fenestration data")
         for key in ("room", "system", "climate"):
-            _unique(key, [entry.name for entry in getattr(self, key)])
+            unique(key, [entry.name for entry in getattr(self, key)])
         turned = [angle % 360.0 for angle in self.orientations_deg]
-        _unique("orientations_deg", turned)
-        _unique("methods", self.methods)
+        unique("orientations_deg", turned)
+        unique("methods", self.methods)
         if self.options.spectral and not set(self.methods) <= set(SPECTRAL_METHODS):
             raise ValueError(f"options.spectral: needs methods of {', '.join(SPECTRAL_METHODS)}")
         return self
@@ -198,7 +203,8 @@ class Study(_Table, OutdoorTable):
         return tuple(path for path in named if path is not None)
 
 
-def _unique(key: str, values) -> None:
+def unique(key: str, values) -> None:
+    """Raise `ValueError` for a value that comes twice."""
     seen = set()
     for value in values:
         if value in seen:
@@ -218,7 +224,7 @@ def read_study(path: str | PathLike[str], *, automatic: bool = False, quick: boo
     """
     path = Path(path)
     table = read_table(path)
-    _name_entries(table)
+    name_entries(table)
     if automatic:
         table["methods"] = ["auto"]
     if quick:
@@ -229,10 +235,10 @@ def read_study(path: str | PathLike[str], *, automatic: bool = False, quick: boo
     if study.quick:
         chosen = picks(ROOM, study.options.model_fields_set)
         study = study.model_copy(update={"options": study.options.model_copy(update=chosen)})
-    return _with_places(study, path)
+    return with_places(study, path)
 
 
-def _name_entries(table: dict[str, Any]) -> None:
+def name_entries(table: dict[str, Any]) -> None:
     """Give rooms, systems and climates without a name that of their file."""
     for key, file in (("room", "building"), ("system", "bsdf"), ("climate", "weather")):
         entries = table.get(key)
@@ -243,7 +249,7 @@ def _name_entries(table: dict[str, Any]) -> None:
                 entry["name"] = named
 
 
-def _with_places(study: Study, path: Path) -> Study:
+def with_places(study: Study, path: Path) -> Study:
     """The study with absolute paths of files that are there."""
 
     def there(name: Path | None, key: str) -> Path | None:
@@ -269,7 +275,7 @@ def _with_places(study: Study, path: Path) -> Study:
     result["surroundings"] = tuple(there(name, "surroundings") for name in study.surroundings)
     _check_systems(result["operation"], states=False)
     for system in result["system"]:
-        _check_systems(system.operation, states=system.bsdf is None)
+        _check_systems(system.operation, states=not system.has_optics)
     return study.model_copy(update=result)
 
 

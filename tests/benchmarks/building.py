@@ -37,7 +37,7 @@ PARTS = {
     "reflected sun": [
         "mitsuba_cfs.methods.reflected_sun.reflected_sun",
         "mitsuba_cfs.methods.reflected_sun.reflected_to_sensors",
-        "mitsuba_cfs.methods.reflected_sun.sunlit_rooms",
+        "mitsuba_cfs.methods.reflected_sun.sunlit_room",
     ],
     "illuminance": ["mitsuba_cfs.methods.phase_light.illuminance_of_all"],
     "metrics and their errors": ["scenes.room.daylight.room_daylight"],

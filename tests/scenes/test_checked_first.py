@@ -79,6 +79,12 @@ class Place:
         )
         return "study.toml"
 
+    def design(self, more: str = "", **study: str) -> str:
+        """A design file of `cfs design`."""
+        choice = '[[variable]]\nkey = "operation"\nvalues = ["a.toml"]\n[[objective]]\nname = "energy"\n'
+        self.write("a.toml", "")
+        return self.study(choice + more, **study)
+
     def operation(self, text: str) -> str:
         """An operation file of `cfs run`."""
         self.write("operation.toml", text)
@@ -185,6 +191,12 @@ MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
     "study, --write-ifc": (
         lambda p: ["study", p.study(), "--out", "out", "--write-ifc", "none/a.ifc"],
         "no such folder",
+    ),
+    "design, weather": (lambda p: ["design", p.design(weather="short.epw"), "--out", "out"], SHORT),
+    "design, head": (lambda p: ["design", p.design(room="word.ifc"), "--out", "out"], "word.ifc: not an IFC file"),
+    "design, rule": (
+        lambda p: ["design", p.design('[[constraint]]\nrule = "en17037 glair"'), "--out", "out"],
+        "en17037 has no 'glair'",
     ),
     "study, folder": (lambda p: ["study", p.study(), "--out", p.folder], "--out: "),
     "pv, head": (lambda p: _pv(building="word.ifc"), "word.ifc: not an IFC file"),
@@ -311,6 +323,7 @@ def test_help_loads_nothing_heavy(words: list[str], tmp_path: Path) -> None:
         "run, BSDF",
         "thermal, g",
         "study, g",
+        "design, rule",
         "pv, datasheet",
         "dgp, BSDF",
         "picture, BSDF",

@@ -18,7 +18,7 @@ from scenes.demo import OFFICE, STUDY, VENETIAN_BLIND, WEATHER
 from scenes.explore.case_files import CASE
 from scenes.explore.folder import write_data
 from tests.conftest import REPOSITORY
-from tests.scenes.study_files import study_file
+from tests.scenes.study_files import FEW_RAYS, study_file
 from tests.thermal.test_study import study_file as thermal_file
 
 PV_STUDY = REPOSITORY / "scenes" / "demo" / "facade_pv.toml"
@@ -43,6 +43,12 @@ def to_folder(*words: object, **options) -> Job:
 
 def _study(inputs: Path, out: Path) -> list[object]:
     return ["study", study_file(inputs, "orientations_deg = [0, 90]\n"), "--out", out]
+
+
+def _design(inputs: Path, out: Path) -> list[object]:
+    head = '[[variable]]\nkey = "room.box.window.width"\nvalues = [1.0, 2.0]\n'
+    head += '[[objective]]\nname = "daylight autonomy"\n[search]\nevaluations = 4\nrepeats = 0\n'
+    return ["design", study_file(inputs, rest=FEW_RAYS + head), "--out", out]
 
 
 def _explorer(inputs: Path) -> Path:
@@ -108,6 +114,7 @@ JOBS = {
     "dgp": to_folder("dgp"),
     "explore": Job(lambda inputs, out: ["explore", _explorer(inputs), "--out", out], folder=True),
     "study": Job(_study, folder=True),
+    "design": Job(_design, folder=True),
     "study --write-ifc": Job(
         lambda inputs, out: ["study", _study_of_the_office(inputs), "--out", inputs / "results", "--write-ifc", out],
         "out.ifc",
@@ -159,7 +166,7 @@ JOBS = {
     "calibrate": Job(lambda _, out: ["calibrate", "--out", out], "out.json"),
 }
 # they take ten seconds and more; the same code writes for the others, which stay quick
-HEAVY = ("study", "study --write-ifc", "demo", "pv", "ifc survey", "comply", "comply --write-ifc")
+HEAVY = ("study", "design", "study --write-ifc", "demo", "pv", "ifc survey", "comply", "comply --write-ifc")
 
 
 def heavy_ones_slow(names: Iterable[str]) -> list[ParameterSet]:

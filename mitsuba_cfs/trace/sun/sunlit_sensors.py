@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import reduce
 
 import drjit as dr
 import mitsuba as mi
@@ -24,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from mitsuba_cfs.surfaces import SurfaceGroups
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, tables
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_faces
@@ -72,62 +72,92 @@ def room_cells(inside: TracedScene, *, samples: int = CELL_RAYS * CELL_SHARE) ->
 
 def room_shares(
     cells: tuple[RoomCells, ReflectingCells],
-    rooms: Sequence[TracedScene],
+    inside: TracedScene,
     sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
     *,
     samples: int,
     seed: int = 0,
-) -> list[NDArray[np.float64]]:
-    """Illuminance of sensors by reflection of a unit luminous flux on each cell, in each room [S, c] [1/m2].
+) -> NDArray[np.float64]:
+    """Illuminance of sensors by reflection of a unit luminous flux on each cell [S, c] [1/m2].
 
     Args:
-        rooms: of one shape, with reflectances of their own; all have the same rays.
         sensors: positions and normals [S, 3].
         samples: rays of each sensor.
     """
-    points, normals = (np.atleast_2d(v) for v in sensors)
-    local = SurfacePoints((points - rooms[0].centre).astype(np.float32), normals.astype(np.float32))
-    narrow, wide = cells[0], cells[1].cells
-    every = np.arange(local.size)
-    firsts = _reflected(narrow, rooms, local, every, local.size, samples=samples, seed=seed ^ 0x6A09E667)
-    entries = np.ones(narrow.size), (np.arange(narrow.size), cells[1].of)
-    joined = sparse.csr_array(entries, shape=(narrow.size, wide.size))
-    steps = [(first @ joined).toarray() for first in firsts]
-    met = np.flatnonzero(np.any([step.any(axis=0) for step in steps], axis=0))
-    shares = []
-    for first, step, between in zip(firsts, steps, _between(cells[1], rooms, met, seed), strict=True):
-        later = _reflected_again(step, between)
-        shares.append(first.toarray() / narrow.area + (later / wide.area)[:, cells[1].of])
+    (shares,) = shares_and_derivatives(cells, inside, sensors, samples=samples, seed=seed)
     return shares
 
 
-def _reflected_again(step: NDArray[np.float64], between: sparse.csr_array) -> NDArray[np.float64]:
-    """What cells have of the sensors by all later reflections [S, w], from those of the first."""
-    whole, found = step.sum(), np.zeros_like(step)
+def shares_and_derivatives(
+    cells: tuple[RoomCells, ReflectingCells],
+    inside: TracedScene,
+    sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
+    *,
+    samples: int,
+    seed: int = 0,
+    by_groups: SurfaceGroups | None = None,
+) -> NDArray[np.float64]:
+    """`room_shares`, then its derivatives by ln(rho) of groups of surfaces [1 + N, S, c].
+
+    W' = A' + (A' + A' F + ...) F + (A + A F + ...) F'
+    """
+    points, normals = (np.atleast_2d(v) for v in sensors)
+    local = SurfacePoints((points - inside.centre).astype(np.float32), normals.astype(np.float32))
+    narrow, wide = cells[0], cells[1].cells
+    every = np.arange(local.size)
+    numbers = None if by_groups is None else by_groups.number
+    layers = 1 if by_groups is None else 1 + len(by_groups.names)
+    first = _reflected(
+        narrow,
+        inside,
+        local,
+        every,
+        local.size,
+        samples=samples,
+        seed=seed ^ 0x6A09E667,
+        numbers=numbers,
+        layers=layers,
+    )
+    entries = np.ones(narrow.size), (np.arange(narrow.size), cells[1].of)
+    joined = sparse.csr_array(entries, shape=(narrow.size, wide.size))
+    steps = np.stack([(one @ joined).toarray() for one in first])
+    between = _between(cells[1], inside, np.flatnonzero(steps[0].any(axis=0)), seed, numbers, layers)
+    whole, found = steps[0].sum(), np.zeros_like(steps)
     for _ in range(BOUNCES):
-        step = step @ between
-        found += step
-        if step.sum() <= LAST * (whole + found.sum()):
+        met = steps[0]
+        steps = np.stack([step @ between[0] for step in steps])
+        for number in range(1, layers):
+            steps[number] += met @ between[number]
+        found += steps
+        if steps[0].sum() <= LAST * (whole + found[0].sum()):
             break
-    return found
+    narrowly = np.stack([one.toarray() for one in first])
+    shares: NDArray[np.float64] = narrowly / narrow.area + (found / wide.area)[..., cells[1].of]
+    return shares
 
 
 def _between(
-    wide: ReflectingCells, rooms: Sequence[TracedScene], met: NDArray[np.int64], seed: int
+    wide: ReflectingCells,
+    inside: TracedScene,
+    met: NDArray[np.int64],
+    seed: int,
+    numbers: NDArray[np.int64] | None,
+    layers: int,
 ) -> list[sparse.csr_array]:
-    """What cells of each room have of each other [w, w]: of those that some meet, and of what these meet.
+    """What cells have of each other [w, w], and its derivatives: of those that some meet, and of what these meet.
 
     The others, most of them the backs of walls, have no part in any sensor's light.
     """
     size = wide.cells.size
-    found, known = [sparse.csr_array((size, size)) for _ in rooms], np.zeros(size, dtype=bool)
+    found, known = [sparse.csr_array((size, size)) for _ in range(layers)], np.zeros(size, dtype=bool)
     while len(met):
         known[met] = True
-        added = _reflected(wide.cells, rooms, wide.starts, met, size, samples=wide.rays, seed=seed)
+        added = _reflected(
+            wide.cells, inside, wide.starts, met, size, samples=wide.rays, seed=seed, numbers=numbers, layers=layers
+        )
         found = [one + more for one, more in zip(found, added, strict=True)]
         others = np.zeros(size, dtype=bool)
-        for one in added:
-            others[one.indices] = True
+        others[found[0].indices] = True
         met = np.flatnonzero(others & ~known)
     return found
 
@@ -149,22 +179,27 @@ def room_light(
 
 def _reflected(
     cells: RoomCells,
-    rooms: Sequence[TracedScene],
+    inside: TracedScene,
     starts: SurfacePoints,
     rows: NDArray[np.int64],
     count: int,
     *,
     samples: int,
     seed: int,
+    numbers: NDArray[np.int64] | None = None,
+    layers: int = 1,
 ) -> list[sparse.csr_array]:
-    """Irradiance of rows by a unit of irradiance on each cell that their rays meet, in each room [count, c].
+    """Irradiance of rows by a unit of irradiance on each cell that their rays meet [count, c].
+
+    Followed by its derivatives by ln(rho) of groups of surfaces.
 
     Args:
         starts: [count * n] places that the rays of each row start from, in turn.
         rows: those that rays are sent from; the others are empty.
+        numbers: of each surface's group [F]; None: no derivatives.
     """
-    inside, found = rooms[0], [sparse.csr_array((count, cells.size)) for _ in rooms]
     n = starts.size // max(count, 1)
+    found = [sparse.csr_array((count, cells.size)) for _ in range(layers)]
     block, key = max(1, RAYS // samples), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
     points, normals = starts.points(), starts.normals()
     for begin in range(0, len(rows), block):
@@ -180,12 +215,21 @@ def _reflected(
         way = mi.Frame3f(normal).to_world(mi.warp.square_to_cosine_hemisphere(u))
         hit = inside.scene.ray_intersect_preliminary(mi.Ray3f(point, way), coherent=False)
         met = hit.is_valid()
-        reflected = [room.whole(hit.prim_index, way, met) for room in rooms]
-        met &= reduce(dr.maximum, reflected) > 0
-        cell, *reflected = tables(cells.of(*hit_faces(inside, point, way, hit, met), met), *reflected)
-        kept = np.flatnonzero(cell >= 0)
-        places = some[kept // samples], cell[kept]
-        for q, rho in enumerate(reflected):
-            entries = rho[kept].astype(float) / samples, places
-            found[q] = found[q] + sparse.csr_array(sparse.coo_array(entries, shape=found[q].shape))
+        rho = inside.whole(hit.prim_index, way, met)
+        met &= rho > 0
+        cell = cells.of(*hit_faces(inside, point, way, hit, met), met)
+        known = [cell, rho]
+        if numbers is not None:
+            slant = dr.abs(dr.dot(dr.gather(mi.Vector3f, inside.normal, hit.prim_index, met), way))
+            known += [dr.gather(mi.UInt32, inside.surface, hit.prim_index, met)]
+            known += [inside.diffuse(hit.prim_index, slant, met)]
+        cell, rho, *of_surface = tables(*known)
+        for layer in range(layers):
+            there, weight = cell >= 0, rho
+            if layer and numbers is not None:
+                surface, weight = of_surface
+                there = there & (numbers[surface] == layer - 1)
+            kept = np.flatnonzero(there)
+            entries = weight[kept].astype(float) / samples, (some[kept // samples], cell[kept])
+            found[layer] = found[layer] + sparse.csr_array(sparse.coo_array(entries, shape=(count, cells.size)))
     return found

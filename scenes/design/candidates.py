@@ -1,0 +1,272 @@
+"""A candidate of a design: values of its variables, and the study that they make."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from copy import deepcopy
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from pydantic import BaseModel
+
+from mitsuba_cfs.errors import DataError, no_such_key
+from scenes.design.blinds import operation_text, states_of, with_slats, write_once
+from scenes.design.design_file import OWN, SYSTEM, Design, DesignSystem, VariableTable
+from scenes.quick import ROOM, picks
+from scenes.room.operation_tables import OperationTables
+from scenes.room.options import RoomOptions
+from scenes.study.study_file import Study
+from scenes.toml_file import read_table, validated
+
+Point = tuple[float | int, ...]  # of each variable: the number of its option, or a number
+OPERATION = "operation"
+# keys of a box's window that stand for others: its height by its head, plates round it
+OF_WINDOW = ("head", "overhang", "fins")
+LOWERED = {"rule": "always", "state": 1}  # of a blind without a rule
+CHEAP = {"methods": ["three-phase"], "glare": "sDGP"}  # of the search where `search.quick`
+DEGREES, METRES = "_deg", ("slat_width", "slat_spacing", "slat_radius", "distance", "width", "height", "sill", "depth")
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """A point of a design, and the study of it; equal studies have equal cases."""
+
+    point: Point
+    label: str  # its values in words
+    values: tuple[tuple[str, str], ...]  # of each variable that matters to it: name and value
+    system: DesignSystem | None
+    study: Study
+
+
+def candidate(
+    design: Design, point: Point, folder: Path, *, quick: bool = False, seed: int = 0, traced: bool = True
+) -> Candidate:
+    """The candidate of a point.
+
+    Args:
+        folder: of the systems and operation files that it is made of.
+        quick: with the methods of the search.
+        seed: added to that of the study's options.
+        traced: whether blinds are traced; without, the study is checked and cannot be computed.
+
+    Raises: `DataError` for values that do not go together.
+    """
+    values = {one.name: value_of(one, at) for one, at in zip(design.variable, point, strict=True)}
+    table = design.model_dump(exclude_unset=True, exclude=set(OWN))
+    settings = [(one, key, value) for one in design.variable for key, value in one.settings(values[one.name]).items()]
+    system = _chosen(design, [(key, value) for _, key, value in settings])
+    own: dict[str, Any] = {} if system is None else next(t for t in table["system"] if t["name"] == system.name)
+    operation: dict[str, Any] = {}
+    acting = set()
+    for variable, key, value in settings:
+        try:
+            acts = _set(table, own, operation, key, value)
+        except DataError as error:
+            raise DataError(error.message, field=f"variable {variable.name}, {key}") from None
+        if acts:
+            acting.add(variable.name)
+    _shape_windows(table)
+    words = tuple((one.name, _words(one, values[one.name])) for one in design.variable if one.name in acting)
+    named = {SYSTEM, *(one.name for one in design.variable if one.choices)}  # by their values alone
+    label = ", ".join(text if one in named else f"{one} {text}" for one, text in words)
+    if system is not None:
+        system = _validated(DesignSystem, own)
+        operated = _operated(system, table.get(OPERATION), operation, folder, traced)
+        table["system"] = [{k: v for k, v in operated.items() if v is not None} | {"name": label or system.name}]
+    elif operation:
+        base = table.get(OPERATION)
+        table[OPERATION] = _write_operation(_base(base), operation, folder)
+    if quick:
+        stated = cast(BaseModel, design.options).model_fields_set
+        table |= CHEAP | ({"glare": "none"} if design.glare == "none" else {})
+        if any(one.needs_sun for one in design.constraint):
+            table["methods"] = ["five-phase"]
+        table["options"] = table.get("options", {}) | picks(ROOM, stated)
+        table["quick"] = True
+    if seed:
+        options = table.get("options", {})
+        table["options"] = options | {"seed": options.get("seed", RoomOptions().sampling.seed) + seed}
+    return Candidate(point, label, words, system, _validated(Study, table))
+
+
+def value_of(variable: VariableTable, at: float | int) -> Any:
+    """The value at a coordinate of a point."""
+    return variable.options[int(at)] if variable.options else float(at)
+
+
+def check_variables(design: Design, folder: Path) -> None:
+    """Raise `DataError` for the first variable with a value that cannot be, others at their first.
+
+    A system that a variable does not matter to is passed over.
+    """
+    middle: Point = tuple(0 if one.options else one.span[0] for one in design.variable)
+    systems = next((i for i, one in enumerate(design.variable) if one.key == SYSTEM), None)
+    starts = [middle]
+    if systems is not None:
+        count = len(design.variable[systems].options)
+        starts = [(*middle[:systems], number, *middle[systems + 1 :]) for number in range(count)]
+    mattered = set()
+    for start in starts:
+        for number, one in enumerate(design.variable):
+            ends = (0, len(one.options) - 1) if one.is_number and one.options else range(len(one.options))
+            for at in ends or one.span:
+                point = (*start[:number], at, *start[number + 1 :])
+                made = candidate(design, point, folder, quick=design.search.quick, traced=False)
+                mattered |= {name for name, _ in made.values}
+    for number, one in enumerate(design.variable):
+        if one.name not in mattered:
+            key = one.key or next(iter(next(iter(one.choices.values()))), "")
+            raise DataError(f"no system has {key!r}", field=f"variable.{number}.key")
+
+
+def _chosen(design: Design, settings: list[tuple[str, Any]]) -> DesignSystem | None:
+    names = [value for key, value in settings if key == SYSTEM] or list(design.names[:1])
+    return next((one for one in design.system if one.name in names[-1:]), None)
+
+
+def _set(table: dict[str, Any], own: dict[str, Any], operation: dict[str, Any], key: str, value: Any) -> bool:
+    """Set a key of the study's table, its system or its operation; whether it matters there.
+
+    Raises: `DataError` for a key that there is not.
+    """
+    first, _, rest = key.partition(".")
+    if key == SYSTEM:
+        return True
+    if first == SYSTEM:
+        if not own:
+            raise DataError("there is no [[system]]")
+        if rest.startswith("blind.") and own.get("blind") is None:
+            return False
+        _reach(own, rest.split("."), value, made=False)
+        return True
+    if first == OPERATION and rest:
+        if rest.partition(".")[0] == "control" and own and _one_state(own):
+            return False
+        operation[rest] = value
+        return True
+    _reach(table, key.split("."), value, made=first == "options")
+    return True
+
+
+def _one_state(own: Mapping[str, Any]) -> bool:
+    """Whether a system has a single state, which no rule moves."""
+    return own.get("bsdf") is not None or (bool(own.get("layers")) and own.get("blind") is None)
+
+
+def _reach(table: Any, parts: list[str], value: Any, *, made: bool) -> None:
+    """Set a key down a path; a list without a number is all of its entries."""
+    first, *rest = parts
+    if isinstance(table, list | tuple):
+        if first.isdecimal():
+            if int(first) >= len(table):
+                raise DataError(f"there is no entry {first}: there are {len(table)}")
+            _reach(table[int(first)], rest, value, made=made)
+            return
+        if not table:
+            raise DataError(f"there is no entry to set {first!r} in")
+        for one in table:
+            _reach(one, parts, value, made=made)
+        return
+    if not rest:
+        table[first] = value
+        return
+    if table.get(first) is None:
+        if not made:
+            raise DataError(no_such_key(first, tuple(name for name, one in table.items() if one is not None)))
+        table[first] = {}
+    if isinstance(table[first], tuple):
+        table[first] = list(table[first])
+    _reach(table[first], rest, value, made=made)
+
+
+def _shape_windows(table: dict[str, Any]) -> None:
+    """Heights by heads, and plates as deep as overhangs and fins, of the windows of boxes."""
+    for room in table["room"]:
+        box = room.get("box")
+        plates = [] if box is None else list(box.get("plate", ()))
+        for window in () if box is None else box["window"]:
+            head, overhang, fins = (window.pop(key, None) for key in OF_WINDOW)
+            if head is not None:
+                window["height"] = round(head - window["sill"], 6)
+            left, bottom = window["x"], window["sill"]
+            right, top = left + window["width"], bottom + window["height"]
+            side = window.get("side", "front")
+            edges = [((left, top), (right, top), overhang)]
+            edges += [((x, bottom), (x, top), fins) for x in (left, right)]
+            plates += [{"start": a, "end": b, "depth": depth, "side": side} for a, b, depth in edges if depth]
+        if plates:
+            box["plate"] = plates
+
+
+def _operated(
+    system: DesignSystem, of_study: Path | None, changes: dict[str, Any], folder: Path, traced: bool
+) -> dict[str, Any]:
+    """A `[[system]]` table of a study, with an operation file of its own where it needs one."""
+    plain = system.model_dump(exclude_unset=True, exclude={"layers", "blind", "cost", "carbon"})
+    if not system.layers and not changes:
+        return plain
+    base = _base(system.operation or of_study)
+    if system.layers:
+        base[SYSTEM] = states_of(system, folder, traced=traced)
+    if _one_state(system.model_dump()):
+        base.pop("control", None)
+    file = _write_operation(base, changes, folder, system)
+    return plain | {OPERATION: file}
+
+
+def _base(path: Path | None) -> dict[str, Any]:
+    """An operation file as it stands, the files that it names with absolute paths."""
+    return {} if path is None else _absolute(read_table(path), path.parent)
+
+
+def _absolute(value: Any, folder: Path) -> Any:
+    """A table whose texts that name files of a folder are their absolute paths."""
+    if isinstance(value, dict):
+        return {key: _absolute(one, folder) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_absolute(one, folder) for one in value]
+    if isinstance(value, str) and value and (folder / value).is_file():
+        return str((folder / value).absolute())
+    return value
+
+
+def _write_operation(
+    base: dict[str, Any], changes: Mapping[str, Any], folder: Path, system: DesignSystem | None = None
+) -> Path:
+    """The operation file of a candidate."""
+    table = deepcopy(base)
+    for key, value in changes.items():
+        _reach(table, key.split("."), value, made=True)
+    if system is not None and system.blind is not None:
+        table["control"] = with_slats(table.get("control", LOWERED), system.blind)
+    _validated(OperationTables, table)
+    return write_once(folder, OPERATION, ".toml", operation_text(table))
+
+
+def _validated(model: Any, table: dict[str, Any]) -> Any:
+    """The table as the model; `DataError` that names the first wrong key."""
+    try:
+        return validated(model, table, Path())
+    except DataError as error:
+        raise DataError(error.message, field=error.field) from error
+
+
+def _words(variable: VariableTable, value: Any) -> str:
+    """A value with its unit."""
+    if variable.choices or isinstance(value, str):
+        return str(Path(value).stem) if Path(str(value)).is_absolute() else str(value)
+    unit = variable.unit
+    if unit is None:
+        last = variable.key.rpartition(".")[2]
+        unit = "°" if last.endswith(DEGREES) else " m" if last in (*METRES, *OF_WINDOW) else ""
+    elif unit and unit[0] not in "°%":
+        unit = f" {unit}"
+    return (f"{value:g}" if isinstance(value, int | float) else str(value)) + unit
+
+
+def points(design: Design) -> Iterator[Point]:
+    """Every point of a design whose variables all have options."""
+    from itertools import product
+
+    yield from product(*(range(len(one.options)) for one in design.variable))
