@@ -206,7 +206,7 @@ def test_finished_cases_are_not_computed_again(done, capsys):
     path, out = done
     before = {f: f.stat().st_mtime_ns for f in (out / "cases").iterdir()}
     assert run(["study", str(path), "--out", str(out)]) == 0
-    assert "4 were there, 0 failed" in capsys.readouterr().out
+    assert "4 from an earlier run, 0 failed" in capsys.readouterr().out
     assert {f: f.stat().st_mtime_ns for f in (out / "cases").iterdir()} == before
 
 
