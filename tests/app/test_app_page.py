@@ -252,6 +252,7 @@ def test_results_of_older_inputs_and_a_damaged_file_are_told(tmp_path) -> None:
             go(page, "results")
             cards = page.value("[...document.querySelectorAll('#folders .card')].map((e) => e.innerText)")
             (report,) = [text for text in cards if "report-glazing" in text]
+            assert "preview" in report  # its command had --quick
             assert "out of date" in report and "office.ifc" in report and "Meets it." in report
             best = page.value("[...document.querySelectorAll('#variants .best')].map((e) => e.innerText)")
             assert best == ["82", "12"]
