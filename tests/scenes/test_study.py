@@ -64,6 +64,11 @@ WRONG = {
         BOX + SYSTEM + CLIMATE + "[options]\nspectral = true\n",
         "options.spectral: needs methods of three-phase, five-phase",
     ),
+    "bands with paths": (
+        'methods = ["point-in-time"]\n',
+        BOX + SYSTEM + CLIMATE + "[options]\nbands = true\n",
+        "options.bands: needs methods of three-phase, five-phase",
+    ),
     "no time": (
         "",
         BOX + SYSTEM + CLIMATE + '[auto]\ntime_budget = "soon"\n',
