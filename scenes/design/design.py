@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from bim.model import Building, Space
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, Stage, silent
 from scenes.design.assessment import Assessment, assessed, in_order, on_front, outcome
-from scenes.design.candidates import Candidate, candidate, check_variables, value_of
+from scenes.design.candidates import Candidate, candidate, mattering, same_candidate, value_of
 from scenes.design.design_file import Design, VariableTable
 from scenes.design.search import METHODS, Axis, Outcome, Point, size
 from scenes.result_folder import SYSTEMS
@@ -86,7 +87,8 @@ class Evaluations:
     ) -> None:
         """Args: as of `run_design`."""
         self.design, self.store = design, store
-        self.folder = store.checkpoints(SYSTEMS)
+        self.folder = store.checkpoints(SYSTEMS).absolute()
+        self.matter = mattering(design, self.folder)
         self.plans: dict[tuple[str, ...], StudyPlan] = {}
         self.results: dict[str, CaseResult] = {}
         self.reused = 0
@@ -191,7 +193,6 @@ def run_design(
         progress=progress,
         on_candidate=on_candidate,
     )
-    check_variables(design, every.folder)
     searched = searched_candidates(design, every, search, OF_CLUSTER if scheduler else processes)
     if all(one.error for one in searched):
         raise DataError(f"no candidate can be computed; the first: {searched[0].error}")
@@ -238,7 +239,7 @@ def searched_candidates(
     method = search or METHODS[asked.method]
     if method is METHODS["all"] and not np.isfinite(size(space)):
         raise DataError('"all" needs `step` or `values` of every variable', field="search.method")
-    method(space, evaluate, asked.evaluations, asked.seed, batch)
+    method(space, evaluate, asked.evaluations, asked.seed, batch, partial(same_candidate, design, every.matter))
     return list(found.values())
 
 

@@ -22,7 +22,7 @@ from scenes.demo import WEATHER
 from scenes.design.assessment import Assessment, in_order
 from scenes.design.design import SEARCH, Evaluations, searched_candidates, space_of
 from scenes.design.design_file import Design, read_design
-from scenes.design.search import METHODS, Evaluate, Outcome, Point, Space, every_point
+from scenes.design.search import METHODS, Evaluate, Outcome, Point, Same, Space, every_point, itself
 from scenes.study.store import Store
 
 SHARE = 0.1  # of the points of the grid, that a search may take
@@ -127,7 +127,7 @@ def problem(count: int, folder: Path) -> Design:
     return read_design(path)
 
 
-def cma_es(space: Space, evaluate: Evaluate, budget: int, seed: int, batch: int = 1) -> None:
+def cma_es(space: Space, evaluate: Evaluate, budget: int, seed: int, batch: int = 1, same: Same = itself) -> None:
     """CMA-ES of pymoo on the unit cube, begun again where it stops; limits by a penalty."""
     from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
     from pymoo.core.problem import ElementwiseProblem

@@ -73,10 +73,7 @@ def compared(case: Case, count: int) -> dict[str, float]:
 
 
 def main(
-    design: Annotated[Path, "file of `cfs design`"],
-    *,
-    out: Annotated[Path, "folder of its results"],
-    hours: int = 16,
+    design: Annotated[Path, "file of `cfs design`"], *, out: Annotated[Path, "folder of its results"], hours: int = 16
 ) -> pd.DataFrame:
     """Light and glare of the design's method less those of paths, at the ends of the front."""
     variants.activate()
