@@ -30,6 +30,7 @@ class WindowRectangle:
     height: float  # [m]
     side: str = "front"  # one of BOX_SIDES but "floor"
     frame: float = 0.0  # width of an opaque frame all round inside the opening [m]
+    name: str = ""  # for control groups; none: "window 1" and so on
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +166,7 @@ class _Stated:
 def _window(room: str, part: SideFacet, triangles: NDArray[np.float64], w: WindowRectangle) -> Window:
     return Window(
         f"{room}-window-{part.window}",
-        f"window {part.window + 1}",
+        w.name or f"window {part.window + 1}",
         triangles,
         f"{room}-{part.side}",
         w.width * w.height,

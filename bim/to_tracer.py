@@ -11,7 +11,7 @@ from bim.names import numbered
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.methods.scene import DaylightScene
-from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup, WindowSurface
+from mitsuba_cfs.surfaces import SharedOutdoors, SurfaceGroups, Surfaces, WindowGroup, WindowSurface
 
 SAME_ORIENTATION = 5e-4  # difference between frame axes [1] within a group: 0.03 degrees
 COMPASS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
@@ -25,6 +25,23 @@ def interior_surfaces(space: Space, band: str = "visible") -> Surfaces:
 def furnished_surfaces(space: Space, band: str = "visible") -> Surfaces:
     """What light meets in a room: `interior_surfaces`, then its furniture."""
     return _surfaces([*space.faces, *space.furniture], band)
+
+
+# Groups of surfaces by whose reflectances light is derived, and the kinds of faces in each
+REFLECTANCE_GROUPS = {
+    "floor": ("floor",),
+    "walls": ("wall", "door", "window frame", "reveal"),
+    "ceiling": ("ceiling", "roof"),
+    "furniture": (),
+}
+
+
+def reflectance_groups(space: Space) -> SurfaceGroups:
+    """The groups of the surfaces of `furnished_surfaces`."""
+    names = tuple(REFLECTANCE_GROUPS)
+    of_kind = {kind: number for number, kinds in enumerate(REFLECTANCE_GROUPS.values()) for kind in kinds}
+    numbers = [of_kind[face.kind] for face in space.faces] + [names.index("furniture")] * len(space.furniture)
+    return SurfaceGroups(names, np.array(numbers, dtype=np.int64))
 
 
 def exterior_surfaces(building: Building, space: Space, band: str = "visible") -> Surfaces:

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.gloss import Gloss
 
+MOST_GROUPS = 4  # of surfaces by whose reflectances matrices are derived
+
 
 @dataclass(frozen=True, slots=True)
 class Surfaces:
@@ -75,6 +77,20 @@ class SharedOutdoors:
 
     surfaces: Surfaces
     owner: NDArray[np.int64]  # [N] the room that a triangle is a window of; -1: of none, these come first
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceGroups:
+    """Groups of surfaces by whose reflectances a matrix is derived, such as floor and walls."""
+
+    names: tuple[str, ...]  # [N] at most `MOST_GROUPS`
+    number: NDArray[np.int64]  # [F] group of each surface; -1: of none
+
+    def __post_init__(self) -> None:
+        if not 1 <= len(self.names) <= MOST_GROUPS:
+            raise ValueError(f"expected 1 to {MOST_GROUPS} groups of surfaces, got {len(self.names)}")
+        if len(self.number) and not -1 <= self.number.min() <= self.number.max() < len(self.names):
+            raise ValueError(f"number of a surface's group: expected -1 to {len(self.names) - 1}")
 
 
 @dataclass(frozen=True, slots=True)

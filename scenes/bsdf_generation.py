@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from bim.radiance.cell import read_radiance_layer
 from mitsuba_cfs.bsdf import klems
 from mitsuba_cfs.bsdf.blinds import venetian_blind, vertical_louvre
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
+from mitsuba_cfs.bsdf.checks import missing_data
 from mitsuba_cfs.bsdf.evaluate import klems_of
 from mitsuba_cfs.bsdf.fabric_table import FabricShade, named_fabric, read_fabric_table
 from mitsuba_cfs.bsdf.layers import combine_layers
@@ -217,13 +218,13 @@ def _twice(sheet: SlatMaterial) -> SlatMaterial:
     )
 
 
-def combined_file(paths: Sequence[Path], name: str = "") -> tuple[BsdfFile, pd.DataFrame]:
-    """The layers' system in the bands that all files have, and what each layer absorbs.
+def combined_file(paths: Sequence[Path], name: str = "") -> tuple[BsdfFile, pd.DataFrame, tuple[str, ...]]:
+    """The layers' system in the bands that all files have, and the absorptance of each layer.
 
     Tensor trees and other bases are brought to the Klems full basis.
 
-    Returns: the file, and one row for each band, side that the light comes from, incident patch
-        and layer with its absorptance.
+    Returns: the file; one row for each band, side that the light comes from, incident patch
+        and layer with its absorptance; what the files lack, and what is used instead.
     Args: paths: the exterior layer first.
     """
     files = [read_bsdf_xml(path) for path in paths]
@@ -255,4 +256,15 @@ def combined_file(paths: Sequence[Path], name: str = "") -> tuple[BsdfFile, pd.D
         emissivity_front=files[0].emissivity_front,
         emissivity_back=files[-1].emissivity_back,
     )
-    return combined, pd.concat(tables, ignore_index=True)
+    return combined, pd.concat(tables, ignore_index=True), tuple(_lacking(files, paths, bands))
+
+
+def _lacking(files: Sequence[BsdfFile], paths: Sequence[Path], bands: Sequence[str]) -> Iterator[str]:
+    """Sentences on bands and blocks that the layers of a system lack."""
+    for path, file in zip(paths, files, strict=True):
+        for finding in missing_data(file):
+            band = finding.where.split(" ")[0]
+            if band in bands:
+                yield f"{path.name}: {finding.where} {finding.what}: {finding.consequence}"
+            elif band == "file" and {one for other in files for one in other.bands} - set(bands):
+                yield f"{path.name}: {finding.what}, so the system has none: {finding.consequence}"

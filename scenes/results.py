@@ -311,6 +311,8 @@ class RoomYear:
     operation: OperationResult | None = None  # None: first shading state all year, floating freely
     annual_glare: pd.DataFrame | None = None  # [H] index time: dgp, ev, ...; NaN in the dark
     spectral: SpectralYear | None = None  # of `spectral`
+    # of `sensitivities`, a row for each input and figure, see `scenes.room.sensitivities`
+    sensitivities: pd.DataFrame | None = None
     dgp: AnnualGlare | None = None  # [n] by the metric and in the hours of `rate`
     dgp_sunny_hour_error: float = 0.0  # of three-phase `dgp`
     as_lobe: dict[str, float] = field(default_factory=dict)  # of `scenes.room.lobes`

@@ -46,6 +46,7 @@ SOLVERS = tuple(
         "reflected_sun",
         "standard_error",
         "coloured_room",
+        "sensitivity",
         "spectral_light",
         "sun_by_patches",
         "view_cache",

@@ -35,12 +35,13 @@ NO_EVIDENCE = {
         "| option | what |",
         "| rule | quantity | set-up | weather that it asks for |",
     },
+    "sensitivities.md": {"| column | content |", "| input | deviation | source |"},
     "spectral.md": {"| file | content |", "| part | spectrum |"},
     "app.md": {"| file | content | read by |"},
     "studies.md": {"| in the folder | what |", "| event | what is done |"},
     "pv.md": {"| key | meaning |"},
 }
-ONCE = {"benchmarks.md", "reliability.md"}  # pages that say it once, for all of their tables
+ONCE = {"benchmarks.md", "evidence_reliability.md", "reliability.md"}  # pages that say it once, for all of their tables
 
 
 def tables(page: str) -> list[tuple[str, str]]:

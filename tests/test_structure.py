@@ -42,7 +42,7 @@ RANKS = {
             "room_views",
             "bsdf_generation",
         },
-        {"cluster", "page_options", "provision_levels"},
+        {"cluster", "page_options", "provision_levels", "uncertain_inputs"},
         {"workers"},
         {"fenestration", "cost"},
         {"head", "input_options"},

@@ -445,7 +445,7 @@ def simulate_zones(
     net = network(
         zones, mixes, step_s=step_s, terrain=options.terrain, cell=options.cell, link=link, transfers=transfers
     )
-    method = _method(options, steps, step_s)
+    method = _method(options, steps, step_s, float(climate.pressure.mean()))
     outdoors = _weather(climate, steps)
     state = _start(net, _shape(controls), options.start_c)
     work, years, days = _work(net, state), [], 0
@@ -499,7 +499,7 @@ class SteppedZone:
             cell=self._options.cell,
             link=_links(None, 1),
         )
-        self._method = _method(self._options, self._steps, step_s)
+        self._method = _method(self._options, self._steps, step_s, float(climate.pressure.mean()))
         self._weather = _weather(climate, self._steps)
         self._state = _start(self._net, no_conditions, self._options.start_c)
         self._work = _work(self._net, self._state)
@@ -562,7 +562,7 @@ def _mixes(zone: Zone, suns: Sequence[Solar], hours: int) -> WindowMix:
     return window_mix(zone, np.concatenate(states), hours * len(suns))
 
 
-def _method(options: BalanceOptions, steps: int, step_s: float) -> records.Method:
+def _method(options: BalanceOptions, steps: int, step_s: float, pressure: float) -> records.Method:
     return records.Method(
         steps=steps,
         step_s=float(step_s),
@@ -572,6 +572,7 @@ def _method(options: BalanceOptions, steps: int, step_s: float) -> records.Metho
         inside_radiation=options.inside_radiation or 0.0,
         outside=_OUTSIDE.index(options.outside_convection),
         outside_film=float(options.outside_film),
+        pressure=pressure,
         iterations=options.iterations,
         tolerance=options.tolerance,
         warm_tolerance=options.warm_tolerance,

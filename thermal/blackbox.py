@@ -18,9 +18,11 @@ import logging
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 
 from thermal.errors import require, require_range
+from thermal.records import INLINED
 
 R_OUTER = 0.04  # [m2 K/W] EN 673:2011 / ISO 6946 outer film
 R_INNER = 0.13  # [m2 K/W] EN 673:2011 / ISO 6946 inner film
@@ -33,11 +35,13 @@ _log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class LayerResistance:
-    """Resistance between the two layers: "constant", "linear U" or "surface", and coefficients.
+    """Resistance between the two layers: "constant", "linear U", "surface" or "table", and coefficients.
 
     constant   R = c0                                                          [m2 K/W]
     linear U   R = 1/(c0 + c1 (T_m - 10)) - c2         c2 = R_e + R_i of the measurement
     surface    1/R = c0 + c1 x + c2 d + c3 d^2 + c4 x d + c5 x^2
+    table      1/R linear between the points of a grid: first value, step and number of T_m, the same
+               of d, then 1/R, T_m by T_m
     with T_m the mean of the two layers [degC], x = T_m - 10, d = |T_inner - T_outer|.
     """
 
@@ -46,9 +50,10 @@ class LayerResistance:
 
     def __post_init__(self) -> None:
         counts = {"constant": 1, "linear U": 3, "surface": 6}
-        require(self.kind in counts, "layer resistance", f"{self.kind!r} is not of {list(counts)}")
+        known = self.kind in (*counts, "table")
+        require(known, "layer resistance", f"{self.kind!r} is not of {[*counts, 'table']}")
         got = len(self.coefficients)
-        expected = counts[self.kind]
+        expected = counts.get(self.kind, got)
         require(got == expected, "layer resistance", f"expected {expected} coefficients, got {got}")
         nominal = float(self.at(10.0, 5.0))
         require(nominal > 0, "layer resistance", f"R_s must be positive, got {nominal:.3g} m2 K/W")
@@ -57,11 +62,29 @@ class LayerResistance:
         """R [m2 K/W] at the mean layer temperature [degC] and the difference between them [K]."""
         x, d = np.asarray(mean_c, dtype=float) - 10.0, np.abs(np.asarray(difference, dtype=float))
         c = self.coefficients
+        if self.kind == "table":
+            values = np.array(c)
+            one_by_one = np.vectorize(lambda mean, apart: table_conductance(values, mean, apart), otypes=[float])
+            return 1.0 / one_by_one(x + 10.0, d)
         if self.kind == "constant":
             return np.full(np.broadcast(x, d).shape, c[0])
         if self.kind == "linear U":
             return 1.0 / (c[0] + c[1] * x) - c[2] + 0.0 * d
         return 1.0 / (c[0] + c[1] * x + c[2] * d + c[3] * d**2 + c[4] * x * d + c[5] * x**2)
+
+
+@register_jitable(**INLINED)
+def table_conductance(c: NDArray[np.float64], mean_c: float, difference: float) -> float:
+    """1/R [W/(m2 K)] of a "table"; beyond its grid that of the edge."""
+    rows, columns = int(c[2]), int(c[5])
+    y = min(max((mean_c - c[0]) / c[1], 0.0), rows - 1.0)
+    x = min(max((difference - c[3]) / c[4], 0.0), columns - 1.0)
+    i, j = min(int(y), rows - 2), min(int(x), columns - 2)
+    y, x = y - i, x - j
+    at = 6 + i * columns + j
+    low = (1.0 - x) * c[at] + x * c[at + 1]
+    high = (1.0 - x) * c[at + columns] + x * c[at + columns + 1]
+    return (1.0 - y) * low + y * high
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,6 +279,23 @@ def fit_conductance_surface(mean_c: ArrayLike, difference: ArrayLike, resistance
     return LayerResistance("surface", tuple(float(c) for c in coefficients))
 
 
+def conductance_table(mean_c: ArrayLike, difference: ArrayLike, conductance: ArrayLike) -> LayerResistance:
+    """R(T_m, dT) of a grid, evenly spaced in both.
+
+    Args: conductance: [M, D] at the means [M] [degC] and the differences [D] [K].
+    """
+    head = []
+    for values in (np.asarray(mean_c, float), np.asarray(difference, float)):
+        head += [values[0], values[1] - values[0], len(values)]
+    return LayerResistance("table", tuple(float(c) for c in (*head, *np.ravel(conductance))))
+
+
+def as_surface(resistance: LayerResistance) -> LayerResistance:
+    """A "table" as the "surface" nearest to it in its usual range, -10 to 40 degC and up to 30 K."""
+    mean, difference = (v.ravel() for v in np.meshgrid(np.arange(-10.0, 40.1, 5.0), np.arange(1.0, 30.1, 1.0)))
+    return fit_conductance_surface(mean, difference, resistance.at(mean, difference))
+
+
 def with_realised_films(
     plain: Fenestration, *, r_inner_realised: float | None = None, r_outer_realised: float | None = None
 ) -> Fenestration:
@@ -281,3 +321,50 @@ def with_realised_films(
         emissivity_in=plain.emissivity_in,
         emissivity_out=plain.emissivity_out,
     )
+
+
+def absorbed_at_u(
+    system: Fenestration, moved: Fenestration, outer: NDArray[np.float64], inner: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Sun absorbed in the two layers of a system of another U: as much in all, and as much of it indoors.
+
+    g stays, as where a system is modelled from g and another U.  With a shade of its own: as it was.
+    """
+    if system.shade is not None or moved.shade is not None:
+        return outer, inner
+    (of_outer, _, of_inner), (to_outer, _, to_inner) = system.inward_shares(), moved.inward_shares()
+    whole = outer + inner
+    inwards = of_outer * outer + of_inner * inner
+    changed = np.clip((inwards - to_outer * whole) / (to_inner - to_outer), 0.0, whole)
+    return whole - changed, changed
+
+
+MEASURED_DIFFERENCE = 15.0  # of the air on both sides, EN 673:2011 [K]
+
+
+def with_u_value(system: Fenestration, u_value: float) -> Fenestration:
+    """A system of another U-value: the resistance of its panes is changed at all temperatures.
+
+    The change is that of 1 / U at the measuring condition; films, gaps beside a shade and closures stay.
+    """
+    change = 1.0 / u_value - 1.0 / system.u_value
+    between = MEASURED_DIFFERENCE * (1.0 - system.u_value * (system.r_outer + system.r_inner))
+    shade, resistance = system.shade, system.resistance
+    if resistance is not None:
+        resistance = _with_added(resistance, change, between)
+    if shade is not None:
+        panes, both = (_with_added(one, change, between) for one in (shade.panes, shade.two_layers))
+        shade = replace(shade, panes=panes, two_layers=both)
+    return replace(system, u_value=u_value, resistance=resistance, shade=shade)
+
+
+def _with_added(resistance: LayerResistance, change: float, difference: float) -> LayerResistance:
+    """A resistance with so much more [m2 K/W] at 10 degC and a difference, and in proportion elsewhere."""
+    first, *others = resistance.coefficients
+    if resistance.kind == "linear U":
+        moved = 1.0 / (1.0 / first + change)
+        return LayerResistance(resistance.kind, (moved, others[0] * moved / first, others[1]))
+    nominal = float(resistance.at(10.0, difference))
+    factor = (nominal + change) / nominal
+    power = 1 if resistance.kind == "constant" else -1  # the others are conductances
+    return LayerResistance(resistance.kind, tuple(c * factor**power for c in resistance.coefficients))

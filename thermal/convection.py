@@ -57,8 +57,8 @@ def constant_inside(surface_c: float, air_c: float, normal_z: float) -> float:
 
 
 @register_jitable(**INLINED)
-def iso15099_inside(glass_c: float, air_c: float, height: float) -> float:
-    """Natural convection at the room side of vertical glass (ISO 15099:2003, 8.3.2.2)."""
+def iso15099_inside(glass_c: float, air_c: float, height: float, pressure: float) -> float:
+    """Natural convection at the room side of vertical glass (ISO 15099:2003, 8.3.2.2); pressure [Pa]."""
     dt = abs(glass_c - air_c)
     if dt < 1e-9:
         return MINIMUM
@@ -66,7 +66,7 @@ def iso15099_inside(glass_c: float, air_c: float, height: float) -> float:
     conductivity = 2.873e-3 + 7.76e-5 * film
     viscosity = 3.723e-6 + 4.94e-8 * film
     capacity = 1002.737 + 0.012324 * film
-    density = 101325.0 * 28.97 / (8314.51 * film)
+    density = pressure * 28.97 / (8314.51 * film)
     rayleigh = density**2 * height**3 * 9.81 * capacity * dt / (film * viscosity * conductivity)
     if rayleigh <= CRITICAL:
         nusselt = 0.56 * np.sqrt(np.sqrt(rayleigh))

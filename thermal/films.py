@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal.blackbox import table_conductance
 from thermal.climate import SIGMA
 from thermal.convection import constant_inside, doe2_outside, iso15099_inside, mowitt_outside, tarp_inside
 from thermal.network import WINDOW, Faces
@@ -29,6 +30,8 @@ def layer_conductance(kind: int, c: NDArray[np.float64], inner: float, outer: fl
     if kind == 1:
         u = min(max(c[0] + c[1] * x, 0.05), 0.95 / c[2])
         return 1.0 / (1.0 / u - c[2])
+    if kind == 3:
+        return table_conductance(c, x + 10.0, d)
     return max(c[0] + c[1] * x + c[2] * d + c[3] * d * d + c[4] * x * d + c[5] * x * x, 0.02)
 
 
@@ -43,7 +46,7 @@ def inside_film(faces: Faces, i: int, surface: float, air: float, method: Method
             return method.inside_films[0]
         return method.inside_films[1 if (surface - air) * nz < 0.0 else 2]
     if faces.kind[i] == WINDOW and abs(nz) < 0.1:
-        return iso15099_inside(surface, air, faces.height[i])
+        return iso15099_inside(surface, air, faces.height[i], method.pressure)
     return tarp_inside(surface, air, nz)
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal.blackbox import LayerResistance, ShadeNode, fit_conductance_surface
+from thermal.blackbox import LayerResistance, ShadeNode, conductance_table, fit_conductance_surface
 from thermal.errors import ThermalInputError, require
 from thermal.glazing_unit import Environment, GlazingUnit
 from thermal.layer_balance import INDOORS, OUTDOORS, UnitArrays, UnitState, settle
@@ -27,6 +27,9 @@ G_STATES = ((5.0, 20.0, 300.0), (25.0, 25.0, 500.0))
 STATED_G = G_STATES[1]  # the state of a g that is stated: sunny and warm, as where g is measured
 OUTDOOR_C = (-25.0, -15.0, -5.0, 5.0, 15.0, 25.0, 35.0, 45.0)  # grid of R(T_m, dT)
 INDOOR_C = (5.0, 15.0, 25.0, 35.0, 45.0)
+MEAN_C = np.arange(-30.0, 90.1, 10.0)  # grid of R(T_m, dT) of panes without a shade
+APART_K = np.arange(1.0, 49.1, 2.0)
+FACE_HELD = 1e4  # [W/(m2 K)]: a face is within 0.05 K of the temperature beyond
 UNSETTLED = 1e-3  # [K] change of the last round beyond which a state has no meaning
 
 
@@ -170,9 +173,29 @@ def iso15099_data(unit: GlazingUnit, u_value: float | None = None) -> Iso15099Da
         message = f"U = {u_value:g} is more than the layers let through: {found:.3g} W/(m2 K)"
         require(bool(resistance.min() > 1e-4), "glazing", message)
         found = u_value
-    fit = fit_conductance_surface(mean, difference, resistance)
+    if unit.shade_place == "none" and all(gap.blown is None for gap in unit.gaps):
+        fit = _panes_table(unit, 1.0 / found - 1.0 / computed)
+    else:
+        fit = fit_conductance_surface(mean, difference, resistance)
     shade = _shade_node(unit, 1.0 / found - 1.0 / computed, fit, (r_outer, r_inner))
     return Iso15099Data(found, r_outer, r_inner, fit, shade)
+
+
+def _panes_table(unit: GlazingUnit, shift: float) -> LayerResistance:
+    """R(T_m, dT) of panes, whose faces a prescribed strong film holds at any two temperatures.
+
+    Args: shift: of the resistance [m2 K/W].
+    """
+    conductance = np.empty((len(MEAN_C), len(APART_K)))
+    for i, mean in enumerate(MEAN_C):
+        for j, apart in enumerate(APART_K):
+            outdoor, indoor = (Environment(mean + side * apart, FACE_HELD) for side in (-0.5, 0.5))
+            balance = unit_balance(unit, Conditions(outdoor, indoor))
+            resistance = float(balance.faces_c[-1] - balance.faces_c[0]) / -balance.heat_in + shift
+            message = f"U is {-shift:.3g} m2 K/W too high for the resistance of the panes"
+            require(resistance > 1e-4, "glazing", message)
+            conductance[i, j] = 1.0 / resistance
+    return conductance_table(MEAN_C, APART_K, conductance)
 
 
 def _shade_node(
@@ -191,10 +214,6 @@ def _shade_node(
     shade, pane = (unit.layers[k] for k in ((0, 1) if exterior else (-1, -2)))
     kept, gaps = (slice(1, None), slice(1, None)) if exterior else (slice(-1), slice(-1))
     bare = replace(unit, layers=unit.layers[kept], gaps=unit.gaps[gaps])
-    found = [_middle(state) for state in _dark_states(bare)]
-    mean, difference, resistance = (np.array(column) for column in zip(*found, strict=True))
-    message = f"U is {-shift:.3g} m2 K/W too high for the resistance of the panes"
-    require(bool((resistance + shift).min() > 1e-4), "glazing", message)
     # longwave between pane and shade, and from both to the shade's side, by the pane and the
     # openings too.  With the room it is one flow, divided by weights: what that gives the shade of
     # the pane's own is between both
@@ -215,7 +234,7 @@ def _shade_node(
         exchange=pane.emissivity[side] * towards / bounces + between,
         pane_weight=of_pane / whole,
         emissivity=whole,
-        panes=fit_conductance_surface(mean, difference, resistance + shift),
+        panes=_panes_table(bare, shift),
         **_dark_shares(unit, shift, exterior),
         two_layers=two_layers,
         film=films[0 if exterior else 1],

@@ -208,7 +208,7 @@ def mean_height(zone: Zone) -> float:
 OUTDOOR, KNOWN, ADIABATIC, TWIN, PARTITION, PARTNER, WINDOW = range(7)
 _CODES = {"outdoor": OUTDOOR, "ground": KNOWN, "known": KNOWN, "adiabatic": ADIABATIC}
 _CODES |= {"twin": TWIN}
-_RESISTANCE_KINDS = {"constant": 0, "linear U": 1, "surface": 2}
+_RESISTANCE_KINDS = {"constant": 0, "linear U": 1, "surface": 2, "table": 3}
 
 
 class Faces(NamedTuple):
@@ -248,7 +248,7 @@ class Glass(NamedTuple):
     """Windows (axis W) in their shading states (axis J)."""
 
     kind: NDArray[np.int64]  # [W, J] of the layer resistance
-    coefficient: NDArray[np.float64]  # [W, J, 6]
+    coefficient: NDArray[np.float64]  # [W, J, C] of it, as `LayerResistance` has them
     extra: NDArray[np.float64]  # [W, J, 2] conductances [W/(m2 K)] to outdoor and room air
     # [W, J, 7] shades that are nodes: gap's width (0: none), height, tilt, impedance; longwave to
     # the pane; weight of the pane in what the shade's side sees; 1: outside
@@ -559,7 +559,8 @@ def _glass(elements: list[tuple[int, OpaqueSurface | WindowElement]]) -> Glass:
     windows = [e for _, e in elements if isinstance(e, WindowElement)]
     states = max((len(w.states) for w in windows), default=1)
     kind = np.zeros((len(windows), states), dtype=np.int64)
-    coefficient = np.zeros((len(windows), states, 6))
+    most = max((len(state.layer_resistance.coefficients) for w in windows for state in w.states), default=0)
+    coefficient = np.zeros((len(windows), states, max(most, 6)))
     extra = np.zeros((len(windows), states, 2))
     shade = np.zeros((len(windows), states, 7))
     emissivity = np.zeros((len(windows), states))

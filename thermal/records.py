@@ -174,6 +174,7 @@ class Method(NamedTuple):
     inside_radiation: float  # [W/(m2 K)] between black faces; 0: by their temperatures
     outside: int  # 0 DOE-2, 1 MoWiTT, 2 constant
     outside_film: float  # [W/(m2 K)] for 2
+    pressure: float  # of the air, mean of the climate [Pa]
     iterations: int
     tolerance: float  # [K] between iterates
     warm_tolerance: float  # [K] between warm-up days

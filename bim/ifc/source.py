@@ -47,6 +47,12 @@ from mitsuba_cfs.errors import DataError
 Entity = Any  # of ifcopenshell, which has no types
 STOREY = 2.0  # levels that lie nearer are half storeys, floor finishes or wall tops [m]
 DEEPEST = 20  # operands of operands of a body
+# Names of a project in the templates of Revit (English, German, French, Spanish, Chinese, Russian), ArchiCAD, Bonsai
+TEMPLATE_NAMES = {
+    *("project", "project name", "project number", "0001", "my project", "default project", "projektname"),
+    *("projektnummer", "nom du projet", "numéro de projet", "nombre de proyecto", "número de proyecto"),
+    *("项目名称", "项目编号", "наименование проекта", "номер проекта", "unnamed", "undefined", "default"),
+}
 
 
 def keep_storeys(
@@ -230,16 +236,22 @@ class Source:
 
     @property
     def name(self) -> str:
-        """Name of the project, else of the file."""
+        """Name of the project, else of the file; names that templates of authoring programs hold are none."""
         project = self.model.by_type("IfcProject")
-        name = (project[0].LongName or project[0].Name or "") if project else ""
-        return name or self.path.stem
+        names = (project[0].LongName, project[0].Name) if project else ()
+        return next((name for name in names if not _of_template(name)), self.path.stem)
 
     def quantity_scales(self) -> QuantityScales:
         """Factors from the file's units of length, area and volume to m, m2 and m3."""
         return QuantityScales(
             length_scale(self.model), area_scale(self.model, "AREAUNIT"), area_scale(self.model, "VOLUMEUNIT")
         )
+
+
+def _of_template(name: str | None) -> bool:
+    """Whether a project's name says nothing of the project."""
+    plain = " ".join((name or "").replace("/", " ").casefold().split())
+    return not plain or plain in TEMPLATE_NAMES
 
 
 def read_source(

@@ -45,12 +45,18 @@ def check_bsdf(file: BsdfFile) -> list[Finding]:
     return findings
 
 
+def missing_data(file: BsdfFile) -> list[Finding]:
+    """Findings about bands and blocks that a file lacks, and what is used instead."""
+    bands = {band: bsdf for band, bsdf in file.bands.items() if band in KNOWN_BANDS}
+    return _check_bands(file) + [one for band, bsdf in bands.items() for one in _check_blocks(band, bsdf)]
+
+
 def _check_bands(file: BsdfFile) -> list[Finding]:
     findings = []
     if "Visible" not in file.bands:
         findings.append(Finding("error", "file", "no Visible band", "daylight cannot be computed with it"))
     if "Solar" not in file.bands:
-        findings.append(Finding("warning", "file", "no Solar band", "heat gains need another file's values"))
+        findings.append(Finding("warning", "file", "no Solar band", "results use the Visible band instead"))
     colour = [band for band in ("CIE-X", "CIE-Z") if band in file.bands]
     if len(colour) == 1:
         findings.append(Finding("warning", "file", f"{colour[0]} alone", "colour is left out"))
@@ -63,15 +69,17 @@ def _check_blocks(band: str, bsdf: Bsdf) -> list[Finding]:
         block, label = getattr(bsdf, name), f"{band} {name.replace('_', ' ')}"
         if name.startswith("reflection"):
             if block is None:
-                findings.append(Finding("warning", label, "is absent", "taken for black, as Radiance does"))
+                findings.append(
+                    Finding("warning", label, "is absent", "no light is reflected from this side, as in Radiance")
+                )
             continue
         other = "transmission_" + ("back" if name.endswith("front") else "front")
         if bsdf.is_dummy(block):
-            what = "is absent" if block is None else "passes nothing: a place holder"
+            what = "is absent" if block is None else "transmits nothing (a placeholder)"
             if bsdf.is_dummy(getattr(bsdf, other)):
                 findings.append(Finding("note", label, what, "the system is opaque"))
             else:
-                text = f"the {other.split('_')[1]}'s by reciprocity stands in, as in Radiance"
+                text = f"transmission {other.split('_')[1]} is used, reversed by reciprocity, as in Radiance"
                 findings.append(Finding("warning", label, what, text))
     return findings
 
@@ -97,7 +105,7 @@ def _check_reciprocity(band: str, bsdf: Bsdf) -> list[Finding]:
         error = reciprocity_error(bsdf, there, back)
         if error is not None and error > RECIPROCITY_SLACK:
             what = f"differs from {back.replace('_', ' ')} reversed by {100 * error:.0f} %"
-            text = "front and back may be swapped, or the data noisy: light depends on the way"
+            text = "front and back may be swapped, or the data are noisy; results depend on the side of the light"
             where = f"{band} {there.replace('_', ' ')}"
             findings.append(Finding("warning", where, what, text))
     return findings

@@ -9,6 +9,9 @@ that goes one way and the other: each transport mode has its own tables (see `pl
 With `peak`, what the matrices send straight on beyond what surrounds it passes undisturbed.
 In variants of colour a file's CIE-X and CIE-Z bands tint its Visible one.
 
+`mi.traverse` shows `matrices` [4, outgoing, incident patch], those of `BLOCKS`, as a differentiable
+parameter: of the grey value, without the beam that `peak` separates.
+
 Importing this module registers the plugin, again for every Mitsuba variant that is set later.
 """
 
@@ -72,11 +75,23 @@ def klems_plugin(
     return entry
 
 
-def scattering_tables(klems: KlemsBsdf) -> NDArray[np.float64]:
-    """BSDF by [side of the light, incident patch, same or other side, outgoing patch] [1/sr]."""
-    full = klems.filled()
-    front = np.stack([full.reflection_front.T, full.transmission_front.T], axis=1)
-    back = np.stack([full.reflection_back.T, full.transmission_back.T], axis=1)
+# The matrices in the order of the parameter `matrices` of the plugin
+BLOCKS = ("reflection_front", "transmission_front", "reflection_back", "transmission_back")
+
+
+def stored_matrices(klems: KlemsBsdf) -> NDArray[np.float64]:
+    """The matrices of `BLOCKS` [4, outgoing patch, incident patch] [1/sr]."""
+    full = klems.filled().blocks()
+    return np.stack([full[name] for name in BLOCKS])
+
+
+def scattering_tables(matrices: NDArray) -> NDArray:
+    """BSDF by [side of the light, incident patch, same or other side, outgoing patch] [1/sr].
+
+    Args: matrices: `stored_matrices`, or the numbers of their entries.
+    """
+    turned = matrices.transpose(0, 2, 1)
+    front, back = (np.stack([turned[i], turned[i + 1]], axis=1) for i in (0, 2))
     return np.stack([front, back])
 
 
@@ -129,7 +144,7 @@ def entry_colours(klems: KlemsBsdf, colour: tuple[KlemsBsdf, KlemsBsdf]) -> NDAr
     """Linear sRGB over the grey value [mode, side, K, same or other side, K, 3] of each entry."""
     if any((b.basis_in, b.basis_out) != (klems.basis_in, klems.basis_out) for b in colour):
         raise ValueError("the CIE-X and CIE-Z bands are on another angle basis than the Visible one")
-    bands = [scattering_tables(band) for band in (colour[0], klems, colour[1])]
+    bands = [scattering_tables(stored_matrices(band)) for band in (colour[0], klems, colour[1])]
     return relative_rgb(*(np.stack([reversed_tables(t), t]) for t in bands))
 
 
@@ -138,7 +153,7 @@ def _register(variant: str) -> None:
     import drjit as dr
     import mitsuba as mi
 
-    from mitsuba_cfs.bsdf.plugin_data import TracedColour, sees_colour
+    from mitsuba_cfs.bsdf.plugin_data import TableParameter, TracedColour, sees_colour
     from mitsuba_cfs.bsdf.traced_klems import TracedBasis, gather, table
 
     class KlemsBsdfPlugin(window_bsdf()):
@@ -153,13 +168,28 @@ def _register(variant: str) -> None:
             if self.peak:
                 klems, straight = without_peak(klems)
                 self.straight = table(straight)  # [side that the light comes from, K]
-            tables = scattering_tables(klems)
+            matrices = stored_matrices(klems)
+            tables = scattering_tables(matrices)
             both = (reversed_tables(tables), tables)  # known: where the light goes, or comes from
             areas = klems.basis_in.projected_solid_angles()
             parts = [cumulative_tables(each, areas) for each in both]
             self.matrix = table(np.stack(both))  # [mode, side, K, same or other side, K]
             self.cumulative = table(np.stack([share for share, _ in parts]))
             self.amounts = table(np.stack([amount for _, amount in parts]))
+            numbers = scattering_tables(np.arange(matrices.size).reshape(matrices.shape))
+            self.parameter = TableParameter(matrices, np.stack([reversed_tables(numbers), numbers]))
+
+        def traverse(self, callback):
+            super().traverse(callback)
+            self.parameter.traverse(callback, "matrices")
+
+        def parameters_changed(self, keys=()):
+            self.parameter.changed()
+
+        def value(self, entry, active):
+            """f of an entry, and the density that it is drawn with: that of the data as read."""
+            density = gather(self.matrix, entry, active)
+            return self.parameter.value(entry, density, active), density
 
         def row(self, ctx, known):
             """Number of the table's row (mode, side, patch) for the direction that is known."""
@@ -177,8 +207,7 @@ def _register(variant: str) -> None:
             column = self.patch(other, ctx.mode != mi.TransportMode.Importance)
             row = 2 * self.row(ctx, known) + dr.select(through, mi.UInt32(1), mi.UInt32(0))
             entry = row * self.size + column
-            value = gather(self.matrix, entry, active)
-            return value, value, entry
+            return *self.value(entry, active), entry
 
         def totals(self, ctx, known, active):
             row = 2 * self.row(ctx, known)
@@ -204,8 +233,7 @@ def _register(variant: str) -> None:
             z = dr.select((known.z > 0) ^ through, z, -z)
             other = mi.Vector3f(x, -y, z) if incident else mi.Vector3f(-x, y, z)
             entry = row * self.size + patch
-            value = gather(self.matrix, entry, active)
-            return other, value, value, entry
+            return other, *self.value(entry, active), entry
 
         def search(self, offset, target):
             """First entry of a row whose cumulative share exceeds `target`."""

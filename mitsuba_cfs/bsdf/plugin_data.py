@@ -64,3 +64,35 @@ class TracedColour:
             ]
             seen.append(rgb[0] * parts[0] + rgb[1] * parts[1] + rgb[2] * parts[2])
         return mi.Spectrum(*seen)
+
+
+class TableParameter:
+    """The numbers of a file's table as a differentiable parameter of a plugin; JIT variants alone.
+
+    Directions are drawn with the numbers as they were read: results stay right where the parameter
+    differs from these, with more noise, as long as nothing that was 0 becomes larger.
+    """
+
+    def __init__(self, values: NDArray[np.float64], numbers: NDArray[np.integer]) -> None:
+        """From the values of the file, and which of them [E] is each entry of the plugin's table."""
+        self._is_changed = False
+        self.values = None
+        if not mi.variant().startswith("scalar"):
+            self.values = mi.TensorXf(np.ascontiguousarray(values, dtype=np.float32))
+            self._numbers = mi.UInt32(np.ascontiguousarray(np.ravel(numbers), dtype=np.uint32))
+
+    def traverse(self, callback, name: str) -> None:
+        """Show the parameter."""
+        if self.values is not None:
+            callback.put(name, self.values, mi.ParamFlags.Differentiable)
+
+    def changed(self) -> None:
+        """Take the parameter's values from now on."""
+        self._is_changed = True
+
+    def value(self, entry, read, active=True):
+        """The value of a table's entry; `read`: as the file has it."""
+        if self.values is None or not (self._is_changed or dr.grad_enabled(self.values)):
+            return read
+        number = dr.gather(mi.UInt32, self._numbers, mi.UInt32(entry), active)
+        return dr.gather(mi.Float, self.values.array, number, active)

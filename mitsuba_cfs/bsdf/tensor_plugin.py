@@ -37,6 +37,8 @@ class PluginTrees:
     drawn: SamplingTree  # four forward, then four backward trees
     beams: NDArray[np.float64] | None  # with `peak`, by incident cell [4, N, N], rank 3: [4, N]
     colours: NDArray[np.float64] | None  # [L, 3] of the leaves of `valued`, see `relative_rgb`
+    leaves: NDArray[np.float64]  # values of the four forward trees, one after the other
+    numbers: NDArray[np.int64]  # [L] which of these each leaf of `valued` has
 
 
 def plugin_trees(
@@ -51,13 +53,27 @@ def plugin_trees(
     sampled = [sampling_tree(tree) for tree in forward + backward]
     drawn = joined(sampled)
     valued = drawn if rank == 4 else joined(sampled[:4])
+    leaves = np.concatenate([tree.values for tree in forward])
+    numbers = _numbers_of_leaves(forward, rank)
     if colour is None:
-        return PluginTrees(valued, drawn, beams, None)
+        return PluginTrees(valued, drawn, beams, None, leaves, numbers)
     bands = [whole, *(forward_trees(band) for band in colour)]
     if rank == 4:
         bands = [trees + backward_trees(trees) for trees in bands]
     colours = [leaf_colours(y, x, z) for y, x, z in zip(*bands, strict=True)]
-    return PluginTrees(valued, drawn, beams, np.concatenate(colours))
+    return PluginTrees(valued, drawn, beams, np.concatenate(colours), leaves, numbers)
+
+
+def _numbers_of_leaves(forward: list[TensorTree], rank: int) -> NDArray[np.int64]:
+    """Which value of the forward trees each leaf of the trees with values has: trees of numbers."""
+    firsts = np.cumsum([0, *(len(tree.values) for tree in forward)])
+    counted = [
+        TensorTree(tree.rank, tree.depths, first + np.arange(len(tree.values), dtype=float))
+        for tree, first in zip(forward, firsts, strict=False)
+    ]
+    if rank == 4:
+        counted += backward_trees(counted)
+    return np.rint(joined([sampling_tree(tree) for tree in counted]).values).astype(np.int64)
 
 
 def _without_peaks(bsdf: TensorTreeBsdf, whole: list[TensorTree]) -> tuple[list[TensorTree], NDArray[np.float64]]:
@@ -172,7 +188,7 @@ def _register(variant: str) -> None:
     import drjit as dr
     import mitsuba as mi
 
-    from mitsuba_cfs.bsdf.plugin_data import TracedColour, sees_colour
+    from mitsuba_cfs.bsdf.plugin_data import TableParameter, TracedColour, sees_colour
     from mitsuba_cfs.bsdf.traced_klems import gather, table
     from mitsuba_cfs.bsdf.traced_tree import TracedTrees, disk_to_square, integers, square_to_disk
     from mitsuba_cfs.bsdf.traced_tree import gather_integer as gather_root
@@ -191,6 +207,14 @@ def _register(variant: str) -> None:
                 self.beams, self.beam_cells = table(trees.beams), trees.beams.shape[-1]
             if trees.colours is not None:
                 self.colour = TracedColour(trees.colours)
+            self.parameter = TableParameter(trees.leaves, trees.numbers)
+
+        def traverse(self, callback):
+            super().traverse(callback)
+            self.parameter.traverse(callback, "leaves")
+
+        def parameters_changed(self, keys=()):
+            self.parameter.changed()
 
         def tree(self, ctx, known, through):
             """Number of the tree (see `BLOCKS`) for a known direction, and that of its values."""
@@ -229,7 +253,7 @@ def _register(variant: str) -> None:
             root = gather_root(self.draw_roots, number, active)
             density, leaf = self.drawn.value(root, position, self.square(other, azimuth), active)
             if self.rank == 4 or ctx.mode == mi.TransportMode.Importance:
-                return density, density, leaf
+                return self.parameter.value(leaf, density, active), density, leaf
             value, leaf = self.true_value(known, other, active)
             return value, density, leaf
 
@@ -238,7 +262,8 @@ def _register(variant: str) -> None:
             number = self.forward(other, known.z * other.z < 0)
             position, azimuth = self.place(other)
             root = gather_root(self.value_roots, number, active)
-            return self.valued.value(root, position, self.square(known, azimuth), active)
+            value, leaf = self.valued.value(root, position, self.square(known, azimuth), active)
+            return self.parameter.value(leaf, value, active), leaf
 
         def totals(self, ctx, known, active):
             position, _ = self.place(known)
@@ -280,7 +305,7 @@ def _register(variant: str) -> None:
             z = dr.safe_sqrt(1 - x * x - y * y) * dr.sign(known.z)
             other = mi.Vector3f(-x, y, dr.select(through, -z, z))
             if self.rank == 4 or ctx.mode == mi.TransportMode.Importance:
-                return other, density, density, leaf
+                return other, self.parameter.value(leaf, density, active), density, leaf
             value, leaf = self.true_value(known, other, active)
             return other, value, density, leaf
 

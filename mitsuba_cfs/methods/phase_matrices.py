@@ -42,7 +42,7 @@ from mitsuba_cfs.trace.matrices.adjacent import (
 )
 from mitsuba_cfs.trace.matrices.daylight import BATCHES as CELL_BATCHES
 from mitsuba_cfs.trace.matrices.daylight import cell_daylight, cells_of_rooms, daylight_matrix, daylight_of_rooms
-from mitsuba_cfs.trace.matrices.view import view_matrix, views_of_rooms
+from mitsuba_cfs.trace.matrices.view import RoomViews, view_matrix, views_of_rooms
 from mitsuba_cfs.trace.pictures.adjacent import RoomShown, adjacent_picture
 from mitsuba_cfs.trace.pictures.annual import ViewMatrices, ViewNoise, view_matrices
 from mitsuba_cfs.trace.sun.sunlit_rows import (
@@ -166,6 +166,8 @@ class PhaseMatrices:
     straight_daylight: NDArray[np.float64] | None = None  # D_d without what mirrors show
     sensors: Estimate | None = None  # V [S, Q, K]
     direct_sensors: NDArray[np.float64] | None = None  # V_d [S, Q, K]
+    # [N][S, Q, K] derivative of V by ln(rho) of each of the scene's groups of surfaces
+    sensors_by_reflectance: tuple[Estimate, ...] = ()
     exchange: Estimate | None = None  # W [Q, K, Q * K] from window to window by the room
     outdoor_exchange: Estimate | None = None  # X [q, K, q * K] by the outdoors
     view: ViewMatrices | None = None  # V of the view's pixels
@@ -272,12 +274,12 @@ def matrices_together(
         )
     rooms = [TracedRoom(one.scene.interior, one.parts.groups, *sensors_of(*one.scene.sensors())) for one in matrices]
     sharp = [any(has_sharp_beam(one, g) for g in range(len(one.scene.groups))) for one in matrices]
-    views = views_of_rooms(rooms, max_depth=INDOOR_DEPTH, with_direct=any(sharp), **_view_options(sampling), **common)
+    by_groups = [one.scene.by_groups for one in matrices if one.scene.by_groups is not None]
+    views = views_of_rooms(
+        rooms, max_depth=INDOOR_DEPTH, with_direct=any(sharp), by_groups=by_groups, **_view_options(sampling), **common
+    )
     progress("daylight of several rooms", 1.0)
-    return [
-        replace(one, sensors=whole, direct_sensors=None if part is None else part.values)
-        for one, (whole, part) in zip(matrices, views, strict=True)
-    ]
+    return [_with_views(one, of_room) for one, of_room in zip(matrices, views, strict=True)]
 
 
 def _parts_together(
@@ -411,8 +413,9 @@ def with_sensors(matrices: PhaseMatrices, *, progress: Progress = silent) -> Pha
     if matrices.sensors is not None:
         return matrices
     room = TracedRoom(matrices.scene.interior, matrices.parts.groups, *sensors_of(*matrices.scene.sensors()))
-    ((sensors, direct),) = views_of_rooms(
+    (views,) = views_of_rooms(
         [room],
+        by_groups=() if matrices.scene.by_groups is None else (matrices.scene.by_groups,),
         max_depth=INDOOR_DEPTH,
         with_direct=any(has_sharp_beam(matrices, g) for g in range(len(matrices.scene.groups))),
         progress=part(progress, 0.3, 1.0, "daylight"),
@@ -420,7 +423,44 @@ def with_sensors(matrices: PhaseMatrices, *, progress: Progress = silent) -> Pha
         scenes=matrices.scenes,
         **_view_options(matrices.sampling),
     )
-    return replace(matrices, sensors=sensors, direct_sensors=None if direct is None else direct.values)
+    return _with_views(matrices, views)
+
+
+def _with_views(matrices: PhaseMatrices, views: RoomViews) -> PhaseMatrices:
+    return replace(
+        matrices,
+        sensors=views.whole,
+        direct_sensors=None if views.direct is None else views.direct.values,
+        sensors_by_reflectance=views.by_reflectance,
+    )
+
+
+def _window_exchange(matrices: PhaseMatrices, **options: Any) -> Estimate:
+    parts = matrices.parts.groups
+    return window_exchange(
+        matrices.scene.interior,
+        parts,
+        samples=_exchange_samples(matrices.sampling, parts, EXCHANGE_SHARE),
+        max_depth=INDOOR_DEPTH,
+        **options,
+    )
+
+
+def exchange_by_reflectance(matrices: PhaseMatrices) -> NDArray[np.float64]:
+    """Derivative of W by ln(rho) of each of the scene's groups of surfaces [N, Q, K, Q * K]."""
+    groups = matrices.scene.by_groups
+    if groups is None:
+        raise ValueError("the scene names no groups of surfaces: DaylightScene(..., by_groups=...)")
+    both = _window_exchange(
+        matrices,
+        by_groups=groups,
+        stopping=Stopping(batches=2),
+        seed=matrices.sampling.seed,
+        cache=matrices.cache,
+        scenes=matrices.scenes,
+    ).values
+    layers = both.reshape(*both.shape[:2], 1 + len(groups.names), -1)
+    return np.moveaxis(layers, 2, 0)[1:]
 
 
 def with_exchange(matrices: PhaseMatrices, *, indoors: bool = False, outdoors: bool = False) -> PhaseMatrices:
@@ -433,14 +473,7 @@ def with_exchange(matrices: PhaseMatrices, *, indoors: bool = False, outdoors: b
         "scenes": matrices.scenes,
     }
     if indoors and matrices.exchange is None:
-        exchange = window_exchange(
-            matrices.scene.interior,
-            parts,
-            samples=_exchange_samples(matrices.sampling, parts, EXCHANGE_SHARE),
-            max_depth=INDOOR_DEPTH,
-            **common,
-        )
-        matrices = replace(matrices, exchange=exchange)
+        matrices = replace(matrices, exchange=_window_exchange(matrices, **common))
     if outdoors and matrices.outdoor_exchange is None:
         parts = parts[: matrices.outdoor_parts]
         exchange = outdoor_exchange(

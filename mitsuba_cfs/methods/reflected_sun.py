@@ -26,11 +26,12 @@ from mitsuba_cfs.methods.coefficients import GroupCoefficients, beam_matrix, dir
 from mitsuba_cfs.methods.phase_matrices import PhaseMatrices
 from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.sky.annual import AnnualSky
+from mitsuba_cfs.surfaces import SurfaceGroups
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.reflected import Straight, outdoor_light, view_shares, window_shares
 from mitsuba_cfs.trace.sun.sunlit_cells import Beam, RoomCells
-from mitsuba_cfs.trace.sun.sunlit_sensors import room_cells, room_light, room_shares
+from mitsuba_cfs.trace.sun.sunlit_sensors import room_cells, room_light, shares_and_derivatives
 
 BATCHES = 4  # each with its own paths and points
 WINDOW_SHARE = 32  # paths of a patch for D, for each that looks for sunlit surfaces
@@ -96,16 +97,33 @@ def reflected_sun(matrices: PhaseMatrices, sky: AnnualSky) -> ReflectedSun:
 
 def sunlit_room(matrices: PhaseMatrices, sun: ReflectedSun) -> SunlitRoom | None:
     """What the sensors see of the room's surfaces; None where these reflect nothing."""
+    rooms = _sunlit(matrices, sun, None)
+    return rooms[0] if rooms else None
+
+
+def sunlit_derivatives(matrices: PhaseMatrices, sun: ReflectedSun, by_groups: SurfaceGroups) -> list[SunlitRoom]:
+    """The same by ln(rho) of each group of surfaces; none where the surfaces reflect nothing."""
+    return _sunlit(matrices, sun, by_groups)[1:]
+
+
+def _sunlit(matrices: PhaseMatrices, sun: ReflectedSun, by_groups: SurfaceGroups | None) -> list[SunlitRoom]:
     interior = matrices.scene.interior
     if not (interior.reflectance > 0).any():
-        return None
+        return []
     samples = _sensor_samples(matrices, ROOM_SHARE)
     cells = room_cells(sun.inside, samples=samples)
-    shares = tuple(
-        room_shares(cells, sun.inside, matrices.scene.sensors(), samples=samples, seed=_seed(matrices, batch))
+    batches = [
+        shares_and_derivatives(
+            cells,
+            sun.inside,
+            matrices.scene.sensors(),
+            samples=samples,
+            seed=_seed(matrices, batch),
+            by_groups=by_groups,
+        )
         for batch in range(BATCHES)
-    )
-    return SunlitRoom(cells[0], shares)
+    ]
+    return [SunlitRoom(cells[0], layers) for layers in zip(*batches, strict=True)]
 
 
 def reflected_to_sensors(
@@ -131,14 +149,22 @@ def beams_in_rooms(
 
     Args: rooms: None where the surfaces reflect nothing.
     """
-    some, S = [room for room in rooms if room is not None], len(matrices.scene.sensors()[0])
-    found = iter(np.zeros((len(some), S, len(sun.shining))))
-    if some:
-        stacked = [np.concatenate([room.shares[b] for room in some]) for b in range(BATCHES)]
-        light = room_light(some[0].cells, stacked, _beam(matrices, sun, group, g), sun.suns)
-        found = iter(np.mean(light, axis=0).reshape(len(some), S, -1))
-    dark = np.zeros((S, len(sun.sky.illuminance)))
+    some = [room for room in rooms if room is not None]
+    found = iter(np.mean(beams_by_batch(matrices, sun, some, group, g), axis=0))
+    dark = np.zeros((len(matrices.scene.sensors()[0]), len(sun.sky.illuminance)))
     return [dark if room is None else _all_hours(sun, next(found)) for room in rooms]
+
+
+def beams_by_batch(
+    matrices: PhaseMatrices, sun: ReflectedSun, rooms: Sequence[SunlitRoom], group: GroupCoefficients, g: int
+) -> Array:
+    """The same in the hours with sun, by batch [BATCHES, n, S, h]."""
+    S, h = len(matrices.scene.sensors()[0]), len(sun.shining)
+    if not rooms:
+        return np.zeros((BATCHES, 0, S, h))
+    stacked = [np.concatenate([room.shares[b] for room in rooms]) for b in range(BATCHES)]
+    light = room_light(rooms[0].cells, stacked, _beam(matrices, sun, group, g), sun.suns)
+    return np.stack(light).reshape(BATCHES, len(rooms), S, h)
 
 
 def _beam(matrices: PhaseMatrices, sun: ReflectedSun, group: GroupCoefficients, g: int) -> Beam:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.errors import check_number
 from mitsuba_cfs.images.view import View
-from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.surfaces import SurfaceGroups, Surfaces, WindowGroup
 
 
 def _no_points() -> NDArray[np.float64]:
@@ -38,6 +38,7 @@ class DaylightScene:
     normals: NDArray[np.float64] = field(default_factory=_no_points)  # [S, 3]
     view: View | None = None  # of the eye whose glare is rated
     adjacent: tuple[AdjacentRoom, ...] = ()  # behind the last groups; outdoors is behind the others
+    by_groups: SurfaceGroups | None = None  # of the interior, by whose reflectances V is derived
 
     def __post_init__(self) -> None:
         if self.points.shape != self.normals.shape or self.points.shape[1:] != (3,):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,9 +12,9 @@ import click
 import numpy as np
 
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf, BsdfFile
-from mitsuba_cfs.bsdf.checks import check_bsdf
+from mitsuba_cfs.bsdf.checks import Finding, check_bsdf, missing_data
 from mitsuba_cfs.bsdf.evaluate import bsdf_values, direct_hemispherical
-from mitsuba_cfs.bsdf.klems import KlemsBsdf
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, json_text, replacing, write_table, write_text
@@ -76,10 +76,14 @@ def check(file: Path) -> None:
     """
     findings = check_bsdf(read_bsdf_xml(file, energy_limit=np.inf))
     for finding in findings:
-        click.echo(f"{finding.severity}: {finding.where}: {finding.what} -> {finding.consequence}")
+        click.echo(_finding_line(finding))
     errors = sum(finding.severity == "error" for finding in findings)
     if errors:
         raise DataError(f"{errors} finding(s) forbid its use", file=file)
+
+
+def _finding_line(finding: Finding) -> str:
+    return f"{finding.severity}: {finding.where}: {finding.what} -> {finding.consequence}"
 
 
 @command.command()
@@ -91,18 +95,36 @@ def info(file: Path) -> None:
         click.echo(line)
     for band, bsdf in data.bands.items():
         click.echo(f"\n{band}: direct-hemispherical, light from the side of ...")
-        click.echo("theta  where   Tfront   Rfront    Tback    Rback")
-        for theta in INFO_ANGLES_DEG:
-            for where, azimuth in INFO_SIDES.items():
-                if theta == 0 and where != "sky":
-                    continue
-                values = [
-                    direct_hemispherical(bsdf, f"{kind}_{side}", _towards(theta, azimuth, side))[0]
-                    for side in ("front", "back")
-                    for kind in ("transmission", "reflection")
-                ]
-                label = "normal" if theta == 0 else where
-                click.echo(f"{theta:5d}  {label:6s}" + "".join(f"{v:9.4f}" for v in values))
+        click.echo("theta  where    Tfront   Rfront    Tback    Rback")
+        for theta, where, values in _by_direction(bsdf):
+            click.echo(f"{theta:>5s}  {where:7s}" + "".join(f"{v:9.4f}" for v in values))
+
+
+def _by_direction(bsdf: Bsdf) -> Iterator[tuple[str, str, list[float]]]:
+    """Angle of incidence, side of the light, values; one row where all sides are equal, last diffuse light."""
+    for theta in INFO_ANGLES_DEG:
+        rows = {side: _hemispherical(bsdf, theta, azimuth) for side, azimuth in INFO_SIDES.items()}
+        first = rows["sky"]
+        if all(np.allclose(values, first, rtol=0, atol=5e-5) for values in rows.values()):
+            rows = {"normal" if theta == 0 else "all": first}
+        for where, values in rows.items():
+            yield str(theta), where, values
+    yield "", "diffuse", [_diffuse(bsdf, block, side) for block, side in _columns()]
+
+
+def _columns() -> list[tuple[str, str]]:
+    return [(f"{kind}_{side}", side) for side in ("front", "back") for kind in ("transmission", "reflection")]
+
+
+def _hemispherical(bsdf: Bsdf, theta_deg: float, azimuth_deg: float) -> list[float]:
+    return [direct_hemispherical(bsdf, block, _towards(theta_deg, azimuth_deg, side))[0] for block, side in _columns()]
+
+
+def _diffuse(bsdf: Bsdf, block: str, side: str) -> float:
+    """Share of light of equal radiance from all directions, by the Klems patches."""
+    towards = KLEMS_FULL.incident_directions(back=side == "back")
+    weights = KLEMS_FULL.projected_solid_angles()
+    return float(np.average(direct_hemispherical(bsdf, block, towards), weights=weights))
 
 
 def _towards(theta_deg: float, azimuth_deg: float, side: str) -> np.ndarray:
@@ -132,11 +154,8 @@ def _description(data: BsdfFile) -> list[str]:
             kind = f"tensor tree of rank {next(iter(bsdf.blocks().values())).rank}"
         blocks = ", ".join(name.replace("_", " ") for name in bsdf.blocks())
         lines.append(f"{band}: {kind}: {blocks}")
-    notes = list(data.notes)
-    for band, other in (("Visible", "Solar"), ("Solar", "Visible")):
-        if band not in data.bands and other in data.bands:
-            notes.append(f"no {band} band: results use the {other} band instead")
-    return [*lines, *(f"note: {note}" for note in notes)]
+    lines += [f"note: {note}" for note in data.notes]
+    return [*lines, *map(_finding_line, missing_data(data))]
 
 
 @command.command("eval")
@@ -317,13 +336,18 @@ def combine(layers: tuple[Path, ...], name: str, absorptances: Path | None, out:
     for option, path in (("--out", out), ("--absorptances", absorptances)):
         if path is not None:
             check_file(path, field=option, inputs=layers)
-    file, table = combined_file(layers, name)
+    file, table, notes = combined_file(layers, name)
     write_bsdf_xml(file, out)
     if absorptances is not None:
         write_table(table, absorptances, index=False, float_format="%.6g")
     for band in file.bands:
         tau = direct_hemispherical(file.band(band), "transmission_front", [0.0, 0.0, 1.0])[0]
         click.echo(f"{out}: {band}: transmittance at normal incidence {tau:.4f}")
+    for note in notes:
+        click.echo(f"warning: {note}")
+    if not out.with_suffix(".toml").exists():
+        names = "u_value, g_value and shading_position"
+        click.echo(f"state {names} in {out.with_suffix('.toml').name} beside it; a run assumes what is missing")
 
 
 @command.command("interpolate")

@@ -128,7 +128,7 @@ def command(
     files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar, compiled_beside
     from scenes.comply.comply import check_building
-    from scenes.comply.outputs import write_compliance, write_into_ifc
+    from scenes.comply.outputs import answers, write_compliance, write_into_ifc
     from scenes.run.first_plan import plan_lines
 
     if quick:
@@ -139,10 +139,8 @@ def command(
             options, progress, files, head, on_plan=lambda rooms: click.echo("\n".join(plan_lines(rooms)))
         )
         write_compliance(result, folder, quick=quick, page=page_options)
-    for verdict in result.verdicts:
-        if verdict.rooms and verdict.criterion.over != "no building":
-            name = f"{verdict.rule}, {verdict.criterion.title}"
-            click.echo(f"{name}: {verdict.reached} ({verdict.rooms} room(s))")
+    for title, sentence in answers(result):
+        click.echo(f"{title}: {sentence}")
     head.notes((*result.assumptions, *result.notes))
     click.echo(f"dossier: {out / 'dossier.html'}")
     if write_ifc is not None:

@@ -10,6 +10,7 @@ EXAMPLES = {
         "cfs run house.ifc --weather city.epw --out results --quick",
         "cfs run house.ifc --weather city.epw --cfs blind.xml --u 1.1 --g 0.25 --out results",
         "cfs run house.ifc --weather city.epw --space Kitchen --annual-glare --out results",
+        "cfs run house.ifc --weather city.epw --cfs blind.xml --sensitivities --out results",
     ),
     "comply": (
         "cfs comply --list",

@@ -279,6 +279,11 @@ annual_glare_option = click.option("--annual-glare", is_flag=True, help="Compute
 spectral_option = click.option(
     "--spectral", is_flag=True, help="Compute melanopic illuminance and colour of the light; see docs/spectral.md."
 )
+sensitivities_option = click.option(
+    "--sensitivities",
+    is_flag=True,
+    help="Derivatives of the results by reflectances, g, U, gains and others; see docs/sensitivities.md.",
+)
 channels_option = click.option(
     "--channels",
     type=click.Choice(list(map(str, CHANNEL_SETS))),

@@ -24,6 +24,7 @@ from scenes.commands.room_options import (
     processes_option,
     room_options,
     scheduler_option,
+    sensitivities_option,
     size_option,
     spacing_option,
     spectral_option,
@@ -42,6 +43,7 @@ LOADS = ("heating", "cooling", "lighting")
 NEED_PHASES = {
     "annual_glare": "--annual-glare",
     "spectral": "--spectral",
+    "sensitivities": "--sensitivities",
     "explore": "--explore",
     "inner_glass": "--inner-glass",
     "error": "--error",
@@ -72,6 +74,7 @@ class Percentage(click.ParamType):
 @room_options
 @spectral_option
 @channels_option
+@sensitivities_option
 @method_option(METHODS, "see docs/daylight.md", default=_DEFAULT.method)
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g-value at normal incidence.")

@@ -594,9 +594,9 @@ class Check:
         if "sun" in self.parts:
             month, day = options.day
             yield Note(
-                "Sunlight is assessed on {day:02d}.{month:02d}. for solar altitudes from {altitude:g}° ({source}).",
+                "Sunlight is assessed on {day} {month} for solar altitudes from {altitude:g}° ({source}).",
                 day=day,
-                month=month,
+                month=Note("February") if month == 2 else Note("March"),
                 altitude=files.least_altitude_deg,
                 source=files.altitude_source,
             )
@@ -637,7 +637,12 @@ class Check:
             if any("heat" in r.parts and not r.setup for r in self.files.rules.values()):
                 yield Note(template, air_changes=room.infiltration_ach)
         if "open" in self.parts and self.calendar.median_diffuse is None:
-            yield Note("The daylight factor method is not available: the weather file has no diffuse illuminance.")
+            yield Note("The daylight factor method is not available: there is no diffuse daylight in the weather file.")
+        elif "open" in self.parts and not self.calendar.stated_illuminance:
+            yield Note(
+                "The weather file has no diffuse illuminance: its median for the daylight factor method is "
+                "computed from the diffuse irradiance with Perez's luminous efficacy."
+            )
 
 
 def glare_words(options: ComplyOptions, *, shaded: bool) -> str:

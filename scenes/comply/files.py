@@ -9,7 +9,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.options import OTHER_ALTITUDE_DEG, ComplyOptions
-from scenes.comply.rules import RuleTable, read_rule
+from scenes.comply.rules import RuleTable, read_rule, rule_named
 from scenes.comply.uses import RoomUses, read_uses
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.input_files import InputFiles, check_building
@@ -43,7 +43,9 @@ def read_files(options: ComplyOptions) -> ComplyFiles:
     if options.building is None or options.weather is None:
         raise ValueError("a check of files needs a building and a weather")
     check_building(options)
-    rules = {Path(name).stem if name[-5:] == ".toml" else name: read_rule(name) for name in options.standards}
+    rules = {
+        Path(name).stem if name[-5:] == ".toml" else rule_named(name): read_rule(name) for name in options.standards
+    }
     if not rules:
         raise DataError("expected at least one rule", field="--standard")
     inputs = read_inputs(options, light_only=True)

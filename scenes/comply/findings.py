@@ -9,7 +9,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from mitsuba_cfs.glare.classes import exceeded_share, hour_not_exceeded
+from mitsuba_cfs.metrics.en17037 import median_diffuse
 from mitsuba_cfs.metrics.schedules import daylight_hours, lm83_hours
+from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.sunlight import SunExposure
 from scenes.comply.view_out import ViewOut
@@ -46,7 +48,8 @@ class Calendar:
     times: pd.DatetimeIndex  # [H] middle of each interval
     clear_days: tuple[pd.Timestamp, ...]  # the clearest round each equinox
     step_h: float
-    median_diffuse: float | None  # [lx]; None where the file has no illuminance
+    median_diffuse: float | None  # outdoors in the daylight hours [lx]; None where it is 0
+    stated_illuminance: bool = True  # from the weather file, not from its irradiance
 
     def clear_hours(self, clock: int) -> NDArray[np.int64]:
         """Time steps whose interval begins or ends at a clock hour of the clear days."""
@@ -123,7 +126,7 @@ class Findings:
 
     @property
     def median_diffuse(self) -> float | None:
-        """Median diffuse horizontal illuminance outdoors over the daylight hours [lx]."""
+        """Median diffuse horizontal illuminance outdoors over the daylight hours [lx]; None where it is 0."""
         return self.calendar.median_diffuse
 
     def clear_hours(self, clock: int) -> NDArray[np.int64]:
@@ -146,5 +149,6 @@ def calendar_of(weather: Weather) -> Calendar:
         sums = pd.Series(weather.direct_normal[near], index=times[near].normalize())
         days.append(sums.groupby(level=0).sum().idxmax())
     diffuse = weather.diffuse_horizontal_illuminance
-    median = None if diffuse is None else float(np.median(diffuse[daylight]))
-    return Calendar(daylight, lm83_hours(weather), times, tuple(days), weather.step_h, median or None)
+    median = median_diffuse(sky_series(weather).diffuse_horizontal if diffuse is None else diffuse, daylight)
+    hours = lm83_hours(weather)
+    return Calendar(daylight, hours, times, tuple(days), weather.step_h, median or None, diffuse is not None)

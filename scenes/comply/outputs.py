@@ -21,11 +21,11 @@ from bim.sensors import view_point
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.files import write_table, write_text
 from scenes.comply import tables
-from scenes.comply.assess import NOT_COMPUTED, NOT_FOR_IT, BuildingVerdict
+from scenes.comply.assess import NOT_COMPUTED, BuildingVerdict, RoomVerdict
 from scenes.comply.findings import SeatGlare
 from scenes.comply.results import CheckedRoom, Compliance, GridSummary
 from scenes.comply.rules import NOT_MET, RuleTable
-from scenes.comply.tables import missed, values_frame
+from scenes.comply.tables import limit_of, missed, shown, values_frame
 from scenes.figures.chart import Chart, ChartMark, box
 from scenes.figures.plan import FloorPlan, plan, plan_frame
 from scenes.figures.scale import ColourScale, Tick
@@ -38,7 +38,7 @@ from scenes.report.page import FILES as SHARED
 from scenes.report.page import environment, head_lines
 from scenes.report.page_files import page_files
 from scenes.report.room import RoomSection, facts
-from scenes.report.tables import Table, issues_table
+from scenes.report.tables import Table, problems_table
 from scenes.result_folder import ResultFolder
 
 NAMED = 4  # rooms that a sentence names; of more the rest is counted
@@ -59,32 +59,48 @@ def answers(result: Compliance) -> tuple[tuple[str, str], ...]:
 
 def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
     """Such as "medium. 9 of 12 rooms reach at least minimum; below: A, B and C."."""
-    of_rooms = [
-        (room.space.label, one.reached)
+    asked = [
+        (room, one)
         for room in result.rooms
         for one in room.verdicts
-        if one.rule == verdict.rule and one.criterion.key == verdict.criterion.key and one.asked
+        if one.rule == verdict.rule and one.criterion.key == verdict.criterion.key and one.asked and one.applies
     ]
-    asked = [(name, level) for name, level in of_rooms if level != NOT_FOR_IT]
-    unknown = [name for name, level in asked if level == NOT_COMPUTED]
-    missed = [name for name, level in asked if level == NOT_MET]
+    unknown = [room.space.label for room, one in asked if one.reached == NOT_COMPUTED]
+    missed = [_short_of(room.space.label, one) for room, one in asked if one.reached == NOT_MET]
     met = len(asked) - len(unknown) - len(missed)
     parts = [f"{_capital(gettext(verdict.reached))}."]
-    if asked and missed:
+    if missed and not met and not unknown:
+        parts.append(gettext("No room meets it: {rooms}.", rooms=_names(missed)))
+    elif missed:
         parts.append(
             ngettext(
-                "{met} of {count} room meets it; not: {rooms}.",
-                "{met} of {count} rooms meet it; not: {rooms}.",
-                len(asked),
-                met=met,
+                "{count} of {all} rooms meets it; not: {rooms}.",
+                "{count} of {all} rooms meet it; not: {rooms}.",
+                met,
+                all=len(asked),
                 rooms=_names(missed),
             )
         )
     elif asked and not unknown:
-        parts.append(ngettext("The one room meets it.", "All {count} rooms meet it.", len(asked)))
+        both = len(asked) == 2
+        all_of_them = ngettext("The one room meets it.", "All {count} rooms meet it.", len(asked))
+        parts.append(gettext("Both rooms meet it.") if both else all_of_them)
     if unknown and len(unknown) < len(asked):  # else the level says so
         parts.append(gettext("Not computed: {rooms}.", rooms=_names(unknown)))
+    rated = [room.light.glare for room, _ in asked if room.light is not None and room.light.glare is not None]
+    if rated and any("glare" in need.parts for level in verdict.criterion.level for need in level.needs):
+        operated = any(glare.operated for glare in rated)
+        blinds = gettext("blinds closed by the rule of LM-83") if operated else gettext("all blinds open")
+        parts.append(gettext("Rated with {blinds}.", blinds=blinds))
     return " ".join(parts)
+
+
+def _short_of(room: str, verdict: RoomVerdict) -> str:
+    """A room with the first value of the lowest level that misses its limit, and this limit."""
+    for need, value in zip(verdict.criterion.level[0].needs, verdict.values[0], strict=True):
+        if need.met(value) is False:
+            return gettext("{room} ({value}, limit {limit})", room=room, value=shown(need, value), limit=limit_of(need))
+    return room
 
 
 def _capital(text: str) -> str:
@@ -296,7 +312,7 @@ def _filled(result: Compliance, *, quick: bool, page: PageOptions) -> str:
             assumptions=[translated(text) for text in result.assumptions],
             rules=[dossier_rule(result, name) for name in result.rules],
             rooms=rooms,
-            problems=issues_table(result.issues),
+            problems=problems_table(result.issues),
             version=metadata.version("mitsuba-cfs"),
             seconds=tied(_seconds(result.seconds)),
             style=Markup("\n".join(style)),

@@ -139,6 +139,25 @@ def rule_names() -> tuple[str, ...]:
     return tuple(sorted(Path(str(one)).stem for one in FOLDER.iterdir() if one.name[-5:] == ".toml"))
 
 
+def rule_named(name: str) -> str:
+    """The rule that a name means, as standards are written: "EN 17037" is en17037, "WELL v2" well-v2.
+
+    Raises: `DataError` for a name that is none, or that several rules could be.
+    """
+    plain = _plain(name)
+    found = [rule for rule in rule_names() if _plain(rule) == plain]
+    found = found or [rule for rule in rule_names() if plain and _plain(rule).startswith(plain)]
+    if len(found) == 1:
+        return found[0]
+    known = ", ".join(found or rule_names())
+    message = f"{name!r} may be each of {known}" if found else f"no rule {name!r}; there are {known}, and files"
+    raise DataError(message, field="--standard")
+
+
+def _plain(name: str) -> str:
+    return "".join(letter for letter in name.casefold() if letter.isalnum())
+
+
 def read_rule(name: str) -> RuleTable:
     """The rule of that name, or of a TOML file.
 
@@ -146,8 +165,5 @@ def read_rule(name: str) -> RuleTable:
     """
     path = Path(name)
     if path.suffix != ".toml":
-        if name not in rule_names():
-            known = ", ".join(rule_names())
-            raise DataError(f"no rule {name!r}; there are {known}, and files", field="--standard")
-        path = Path(str(FOLDER / f"{name}.toml"))
+        path = Path(str(FOLDER / f"{rule_named(name)}.toml"))
     return validated(RuleTable, read_table(path), path)

@@ -12,6 +12,7 @@ from mitsuba_cfs.bsdf.spectral_pane import SpectralRating, spectral_rating
 from mitsuba_cfs.errors import DataError
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.fenestration.thermal_system import ThermalSystem, checked_system, sun_in_layers
+from thermal.blackbox import as_surface
 from thermal.errors import ThermalInputError
 from thermal.ratings import CLASSES, EUROPEAN, REFERENCE_GLAZINGS, ThermalRating, layered_ratings, shade_ratings
 
@@ -110,6 +111,8 @@ def thermal_toml(state: RatedState) -> str:
         lines.append(f'shading_position = "{state.system.shading_position}"')
     films = state.heat.fenestration.in_series()
     resistance = films.layer_resistance
+    if resistance.kind == "table":
+        resistance = as_surface(resistance)
     if resistance.kind == "surface":
         lines.append(f"surface = [{', '.join(f'{c:.6g}' for c in resistance.coefficients)}]")
         closed = state.heat.model

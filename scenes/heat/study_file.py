@@ -43,6 +43,7 @@ class LayerTable(TomlTable):
 class WindowTable(TomlTable):
     """A rectangular opening of the box."""
 
+    name: str = ""  # for `windows` of [[control.group]]; none: "window 1" and so on
     x: float
     sill: float
     width: Length

@@ -269,8 +269,8 @@ def protection_card(level: str, noise: float | None, words: str = "", worth: flo
 
 
 def dgp_error(value: float) -> str:
-    """The standard error of a DGP."""
-    return decimal(f"± {max(value, 1e-4):.1g}")
+    """The standard error of a DGP, with as many digits as a DGP is worth."""
+    return gettext("± less than 0.001") if value < 1e-3 else decimal(f"± {value:.1g}")
 
 
 def _warm_hours(room: RoomYear) -> Card | None:

@@ -153,7 +153,7 @@ def _glare_error(result: RunResult) -> str:
     if mean is None:
         return ""
     typical, most = (
-        rounded(error, 4) if error >= 5e-5 else gettext("below {limit}", limit=rounded(1e-4, 4))
+        rounded(error, 3) if error >= 5e-4 else gettext("below {limit}", limit=rounded(1e-3, 3))
         for error in (mean, np.nanmax(errors))
     )
     return " " + gettext(

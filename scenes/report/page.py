@@ -423,8 +423,10 @@ def timings_table(result: RunResult) -> tables.Table:
 
 def remaining(manifest: Mapping) -> dict[str, Any]:
     """What the manifest holds besides the parts shown in tables of their own."""
-    shown = ("quick", "inputs", "options", "versions", "fenestration", "seconds", "rooms", "building", "site", "system")
-    return {key: value for key, value in manifest.items() if key not in shown}
+    tables_of_their_own = ("inputs", "options", "versions", "seconds", "rooms")
+    at_the_head = ("quick", "head", "fenestration", "building", "site", "system")
+    shown = (*tables_of_their_own, *at_the_head)
+    return {key: value for key, value in manifest.items() if key not in shown and value not in ([], None)}
 
 
 def _named(manifest: Mapping, name: str) -> str:

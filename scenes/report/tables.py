@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from bim.report.issue import Issue, IssueText, issue_text
+from bim.report.issue import Issue, IssueText
 from bim.report.ranking import ranked
 from scenes.language.catalogue import N_, gettext
 from scenes.language.numbers import cell, semicolons
@@ -163,14 +163,6 @@ def problems_table(issues: Iterable[Issue]) -> Table:
     return Table(gettext("Problems by element"), columns, rows)
 
 
-def issues_table(issues: Iterable[Issue]) -> Table:
-    """The issues of a building's file, one a row."""
-    titles = (gettext("Element"), gettext("Problem"), gettext("Treatment in the model"))
-    rows = [(issue.where, *issue_cells(issue_text(issue, "command", gettext))) for issue in issues]
-    columns = tuple(Column(title, numeric=False) for title in titles)
-    return Table(gettext("Problems by element"), columns, tuple(rows))
-
-
 def issue_cells(text: IssueText) -> tuple[str, str]:
     """An issue, and its effect with the fix."""
     return text.what, semicolons([part for part in (text.effect, text.fix) if part])
@@ -193,6 +185,8 @@ def _flat(content: Mapping, prefix: str = "") -> Iterable[tuple[str, str]]:
 
 def plain_value(value: object) -> str:
     """A value of the manifest as text."""
+    if isinstance(value, bool):
+        return gettext("yes") if value else gettext("no")
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, list | tuple):

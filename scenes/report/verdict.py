@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.notes import Note
 from scenes.language.catalogue import gettext, ngettext
 from scenes.language.numbers import colon, month_name, percent, rounded, semicolons, share, significant, spoken
 from scenes.report.answer import judged, rooms_answer
@@ -16,6 +18,7 @@ from scenes.report.glare_figures import sun_words
 from scenes.report.headline import FAIR, GOOD, POOR, WARM_C, Card, dgp_error, heated, occupied
 from scenes.report.method import METHODS
 from scenes.report.names import rooms_counted, systems_counted
+from scenes.report.sensitivity import sensitivity_sentence
 from scenes.report.tables import GLARE_WORDS, Column, Table, glare_class, step_hours
 from scenes.results import ExploredRoom, LuminancePicture, RoomYear, RunResult
 
@@ -90,6 +93,8 @@ def _error(room: RoomYear, card: Card) -> str:
         return card.error
     if card.unit == "DGP":
         worst = max(room.glare.pictures, key=lambda picture: picture.glare["dgp"])
+        if worst.glare["dgp"] >= 1.0:
+            return gettext("none: DGP ends at 1")
         return plus_minus(worst).strip() or gettext("unknown")
     if card.traced:
         light = float(np.mean(room.daylight.relative_error))
@@ -98,11 +103,12 @@ def _error(room: RoomYear, card: Card) -> str:
 
 
 def plus_minus(picture: LuminancePicture) -> str:
-    """The standard error of a picture's DGP; empty where it is not known."""
+    """The standard error of a picture's DGP; empty where it is not known, or where DGP is limited to 1."""
     error = picture.glare.get("dgp_standard_error", float("nan"))
-    return "" if error != error else f" {dgp_error(error)}"
+    return "" if error != error or picture.glare["dgp"] >= 1.0 else f" {dgp_error(error)}"
 
 
+NO_THERMAL_DATA = re.compile(r"\{system\}: no [Ug]-value given;")  # of `thermal.gvalue`
 MOST_NAMES = 4  # of systems in the first sentence, of rooms in that on shading
 LIT_LX = 300.0  # illuminance of daylight autonomy
 # DGP is BY_LIGHT times the illuminance at the eye, a term of the sources, and NO_LIGHT
@@ -141,6 +147,7 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
         (gettext("Glare"), _glare(result)),
         (gettext("Overheating"), _overheating(result)),
         (gettext("Shading"), _shading(result)),
+        *([(gettext("Inputs that matter most"), matter)] if (matter := sensitivity_sentence(result)) else []),
     )
     named = [(r.space.label, r, card) for r, card in zip(result.spaces, cards, strict=True)]
     answer = rooms_answer([judged(name, figures) for name, _, figures in named])
@@ -233,7 +240,7 @@ def _overheating(result: RunResult) -> str:
     )
     if not warm.any():
         none = gettext("No occupied hour exceeds {limit} °C.", limit=f"{WARM_C:.0f}")
-        return f"{none} {heated(room)}"
+        return " ".join(filter(None, (none, heated(room), assumed_thermal(result.head.assumed))))
     times, step = room.heat.temperatures.index, step_hours(room.heat.temperatures.index)
     months = np.bincount(times.month[warm], minlength=13)
     month = times[warm][times.month[warm] == months.argmax()][0]
@@ -250,7 +257,16 @@ def _overheating(result: RunResult) -> str:
         peak=rounded(float(peak.max()), 1),
         hour=spoken(peak.idxmax()),
     )
-    return f"{text} {heated(room)}"
+    return " ".join(filter(None, (text, heated(room), assumed_thermal(result.head.assumed))))
+
+
+def assumed_thermal(notes: Iterable[str]) -> str:
+    """A sentence that names the systems whose U or g is assumed; empty where all are stated."""
+    assumed = (note for note in notes if isinstance(note, Note) and NO_THERMAL_DATA.match(note.template))
+    names = list(dict.fromkeys(str(note.values["system"]) for note in assumed))
+    if not names:
+        return ""
+    return gettext("The temperatures rest on assumed U- or g-values: {systems}.", systems=_systems(names))
 
 
 def _warm_hours(room: RoomYear) -> NDArray[np.bool_]:

@@ -28,6 +28,7 @@ from scenes.results import (
     ThermalResult,
 )
 from scenes.room.operation_tables import ComfortTable, OperationTables
+from scenes.room.sensitivities import heat_sensitivities
 from scenes.room.zone import RoomZone, balances, coupled, inner_sun_note
 from thermal.balance import ZoneResult
 from thermal.comfort import comfort_by_outdoors, degree_hours, pmv_ppd, standard_effective_temperature, summarise
@@ -202,6 +203,7 @@ class DaylitRoom:
     seconds: dict[str, float]  # by stage
     annual_glare: pd.DataFrame | None = None
     spectral: SpectralYear | None = None
+    sensitivities: pd.DataFrame | None = None  # of its light; None: not asked for
     dgp: AnnualGlare | None = None
     dgp_sunny_hour_error: float = 0.0
     as_lobe: dict[str, float] = field(default_factory=dict)
@@ -209,6 +211,10 @@ class DaylitRoom:
     explored: ExploredRoom | None = None
     template: str = ""
     borrowed: str = ""
+
+    def with_sensitivities(self, of_heat: pd.DataFrame) -> DaylitRoom:
+        """The room with the derivatives of its heat besides."""
+        return replace(self, sensitivities=pd.concat([self.sensitivities, of_heat], ignore_index=True))
 
     def with_heat(self, heat: Heat) -> RoomYear:
         """The room's year, with temperatures and operation."""
@@ -340,6 +346,9 @@ def coupled_years(
     zones, links, _ = coupled([room.zone for room in rooms], tables.air.door_m3_s)
     heats = heat_of(zones, weather, step_s, terrain=tables.terrain, air_links=links, progress=progress, store=store)
     progress("heat balance", 1.0)
+    if any(room.sensitivities is not None for room in rooms):
+        derived = heat_sensitivities(zones, weather, step_s, terrain=tables.terrain, air_links=links)
+        rooms = [room.with_sensitivities(of_heat) for room, of_heat in zip(rooms, derived, strict=True)]
     years = [room.with_heat(heat) for room, heat in zip(rooms, heats, strict=True)]
     return years, (_coupling_note(zones), *inner_sun_note(zones, weather.step_h))
 

@@ -17,14 +17,14 @@ from numpy.typing import NDArray
 from bim.defaults import GLASS_REFLECTANCE, ROOM_REFLECTANCE
 from bim.doorways import THINNEST, light_sources, panes_between, panes_to_windows, reveals_between, wall_depth
 from bim.model import Building, Element, Face, Space
-from bim.to_tracer import element_surfaces, exterior_surfaces, furnished_surfaces, window_groups
+from bim.to_tracer import element_surfaces, exterior_surfaces, furnished_surfaces, reflectance_groups, window_groups
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.methods.light import SeasonalLight, group_shares
 from mitsuba_cfs.methods.optics import BsdfOptics, MatrixOptics, SystemOptics, straight_transmittance
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import AdjacentRoom, DaylightScene
 from mitsuba_cfs.notes import Note
-from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.surfaces import SurfaceGroups, Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.scattering import AngularScattering
 from scenes.fenestration.resolver import StatedValues, glazing_system
 from scenes.fenestration.systems import States
@@ -46,6 +46,7 @@ class InnerGlass:
     area: float  # of the glass [m2]
     open_area: float  # of the doorways [m2]
     faces: frozenset[str]  # names of the room's faces that the glass replaces
+    by_groups: SurfaceGroups  # of the interior
 
 
 def inner_glass(building: Building, space: Space, systems: Mapping[str, States]) -> InnerGlass | None:
@@ -86,7 +87,7 @@ def _inner_glass(
     rest = replace(space, faces=tuple(face for face in space.faces if face.name not in names))
     areas = [sum(f.area for f in used if f.pane.is_open == is_open) for is_open in (False, True)]
     groups = map(tuple, zip(*panes, strict=True))
-    return InnerGlass(furnished_surfaces(rest), *groups, *areas, names)
+    return InnerGlass(furnished_surfaces(rest), *groups, *areas, names, reflectance_groups(rest))
 
 
 def borrowed_share(space: Space, light: PhaseLight | SeasonalLight, inner: InnerGlass | None) -> str:

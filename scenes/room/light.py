@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bim.model import Building, Space
 from bim.sensors import sensor_grid, view_point
-from bim.to_tracer import exterior_surfaces, furnished_surfaces
+from bim.to_tracer import exterior_surfaces, furnished_surfaces, reflectance_groups
 from mitsuba_cfs.images.view import fisheye, fitted
 from mitsuba_cfs.methods.light import SeasonalLight, eye_illuminance, path_light_of, seasonal_light
 from mitsuba_cfs.methods.optics import SystemOptics
@@ -100,6 +100,7 @@ def _scene(room: RoomInputs, building: Building) -> tuple[DaylightScene, InnerGl
         room.options.outputs.picture_size,
         inner=glass,
         file_sensors=room.file_sensors,
+        sensitivities=room.options.outputs.sensitivities,
     )
     return scene, glass
 
@@ -122,7 +123,7 @@ def turned_eyes(light: RoomLight) -> RoomLight:
     def of_season(one: PhaseLight | PathLight) -> PhaseLight:
         if not isinstance(one, PhaseLight):
             raise ValueError("path tracing has no matrices: expected the light of a phase method")
-        own = replace(one.scene, points=points, normals=turned)
+        own = replace(one.scene, points=points, normals=turned, by_groups=None)
         matrices = replace(one.matrices, scene=own, sensors=None, direct_sensors=None, view=None)
         return phase_light(matrices, one.systems, one.sky, reflected=one.reflected)
 
@@ -148,6 +149,7 @@ def room_scene(
     *,
     inner: InnerGlass | None = None,
     file_sensors: FileSensors = NO_SENSORS,
+    sensitivities: bool = False,
 ) -> DaylightScene:
     """Triangles, window groups, sensors and view of a room in the visible band.
 
@@ -156,6 +158,7 @@ def room_scene(
         picture_size: pixels of a side of the view.
         inner: glass to other rooms that gives light; None: that glass is opaque.
         file_sensors: of the building's file; its sensors follow those of the grids.
+        sensitivities: whether light is derived by the reflectances of the room.
     """
     points = np.concatenate([grid_points(space, grid) for grid in grids])
     upwards = np.tile([0.0, 0.0, 1.0], (len(points), 1))
@@ -171,6 +174,7 @@ def room_scene(
         np.concatenate([upwards, *(grid.directions for grid in file_sensors.grids)]),
         view,
         () if inner is None else inner.beyond,
+        None if not sensitivities else reflectance_groups(space) if inner is None else inner.by_groups,
     )
 
 

@@ -524,7 +524,6 @@ def stated_note(building: Building, before: str = "") -> tuple[str, ...]:
 
 
 ASSUMED = {"gains": ("equipment_w_m2", "persons", "occupied"), "air": ("infiltration_ach",)}
-ASSUMED_OF_ROOMS = "equipment_w_m2", "person_w", "floor_per_person", "occupied", "infiltration_ach"
 
 
 def unstated_note(source: OperationTables | RoomOptions, building: Building, file: str = "") -> tuple[str, ...]:
@@ -535,9 +534,18 @@ def unstated_note(source: OperationTables | RoomOptions, building: Building, fil
     if building.spaces and all(space.guid in building.uses for space in building.spaces):
         return ()
     if isinstance(source, RoomOptions):
-        named = source.named()
-        values = ", ".join(f"{key} = {json.dumps(named[key])}" for key in ASSUMED_OF_ROOMS)
-        return (Note("{values}, as no operation file states gains and air.", values=values),)
+        people = source.occupancy
+        note = Note(
+            "Gains and air, as no operation file states them: equipment {equipment:g} W/m2, one person of "
+            "{person:g} W per {floor:g} m2, both daily from {start} to {end} o'clock; {air:g} air changes per hour.",
+            equipment=people.equipment_w_m2,
+            person=people.person_w,
+            floor=people.floor_per_person,
+            start=people.hours[0],
+            end=people.hours[1],
+            air=source.infiltration_ach,
+        )
+        return (note,)
     unstated = [
         f"{name}.{key} = {json.dumps(getattr(table, key))}"
         for name, keys in ASSUMED.items()

@@ -556,7 +556,9 @@ class OperationTables(TomlTable):
         for number, group in enumerate(tables.control.group):
             for name in group.windows:
                 if name not in windows:
-                    message = f"no room has a window {name!r}"
+                    known = sorted({w.name or w.guid for w in space.windows})
+                    there = ", ".join(known[:20]) + (" ..." if len(known) > 20 else "") or "none"
+                    message = f"no room has a window {name!r}; this one has: {there}"
                     field = f"control.group.{number}.windows"
                     raise DataError(message, file=building.file, field=field)
         return tables

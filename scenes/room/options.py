@@ -49,6 +49,7 @@ class Outputs:
     picture_size: int = 600  # pixels of a side of the fisheye picture
     annual_glare: bool = False  # rate every lit hour, not only the pictures
     spectral: bool = False  # alpha-opic quantities and colour of the light
+    sensitivities: bool = False  # derivatives of the results by their inputs
     channels: int = 81  # bands of wavelength for that, a key of CHANNEL_SETS
     glare_sources: str = "evalglare"  # one of GLARE_SOURCES
     glare_sun: str = "source"  # its disc: a source of its own, or part of its pixels
@@ -89,6 +90,8 @@ class RoomOptions:
             raise ValueError("annual glare needs the three-phase or the five-phase method")
         if self.outputs.spectral and self.method == "point-in-time":
             raise ValueError("spectral needs the three-phase or the five-phase method")
+        if self.outputs.sensitivities and self.method == "point-in-time":
+            raise ValueError("sensitivities need the three-phase or the five-phase method")
 
     @property
     def sky(self) -> dict[str, str]:
@@ -143,6 +146,7 @@ NAMES = {
     "window_parts": ("sampling", "window_parts"),
     "annual_glare": ("outputs", "annual_glare"),
     "spectral": ("outputs", "spectral"),
+    "sensitivities": ("outputs", "sensitivities"),
     "channels": ("outputs", "channels"),
     "glare_sources": ("outputs", "glare_sources"),
     "glare_sun": ("outputs", "glare_sun"),

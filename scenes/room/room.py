@@ -52,8 +52,10 @@ from scenes.room.leaks import leak_issues
 from scenes.room.light import RoomLight, room_light
 from scenes.room.lobes import lobe_figures
 from scenes.room.operation import Operation
+from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.room.picture_hours import wanted_hours
+from scenes.room.sensitivities import heat_sensitivities, light_sensitivities
 from scenes.room.shading import control_signals, predicts, room_conditions, ruled_year, temperature_conditions
 from scenes.room.solar import SeasonalOutdoors, seasonal_outdoors
 from scenes.room.spectral import explored_colour, room_spectral
@@ -123,6 +125,11 @@ def compute_room(
     start, progress = time.monotonic(), choices.get("progress", silent)
     heat = heat_alone(lit.zone, weather, options.heat_step_s, progress)
     times.add("thermal", time.monotonic() - start)
+    if lit.sensitivities is not None:
+        with times.stage("sensitivities"):
+            terrain = (lit.zone.operation or OperationTables()).terrain
+            (of_heat,) = heat_sensitivities([lit.zone], weather, options.heat_step_s, terrain=terrain)
+            lit = lit.with_sensitivities(of_heat)
     return replace(lit, seconds=times.seconds).with_heat(heat)
 
 
@@ -183,7 +190,7 @@ def lit_room(
         message = "the explorer knows one state of the trees: give them one transmittance"
         raise DataError(message, file=building.file, field="--explore")
     hours = wanted_hours(options.outputs.picture_hours, weather.midpoints, room.skies.lit)
-    outdoors = year = dgp = rated = explored = surfaces = choice = spectral = None
+    outdoors = year = dgp = rated = explored = surfaces = choice = spectral = sensitivities = None
     dgp_error = 0.0
     times = StageTimes()
 
@@ -230,6 +237,9 @@ def lit_room(
     if options.outputs.spectral:
         with times.stage("spectral"):
             spectral = room_spectral(room, light, state, daylight, progress=progress)
+    if options.outputs.sensitivities:
+        with times.stage("sensitivities"):
+            sensitivities = light_sensitivities(room, light, state, daylight, year, spectral)
     with times.stage("thermal"):
         surfaces = surfaces or zone_surfaces(room)
         if outdoors is None:
@@ -245,6 +255,7 @@ def lit_room(
         times.seconds,
         year,
         spectral=spectral,
+        sensitivities=sensitivities,
         dgp=dgp,
         dgp_sunny_hour_error=dgp_error,
         as_lobe=as_lobe,

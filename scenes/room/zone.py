@@ -234,7 +234,7 @@ def _heated(zone: Zone, faces: Sequence[Sequence[Face]], hours: OperationHours, 
 
 FloatArray = NDArray[np.float64]
 SKY_SAMPLES = 4096  # rays from each surface and window to the sky
-COMPILING = "compiling the heat balance, once: about 10 s"
+COMPILING = "compiling the heat balance, once: about half a minute"
 RADIANT_SHARE = 0.5  # of the heat of people and equipment
 PERSON_VAPOUR = 50.0 / 3.6e6  # of a person at a desk [kg/s]
 
@@ -707,6 +707,13 @@ def _of_lamps(
     return total
 
 
+def lamp_power(tables: OperationTables, floor_area: float, weather: Weather, daylight: FloatArray | None) -> FloatArray:
+    """Power of the lamps [H] [W]; arguments as of `operated`."""
+    gains = tables.gains
+    used = OperationHours(tables, weather).lamps(floor_area) * _of_lamps(gains, daylight, dimmed_share)
+    return used + gains.lighting_standby_w_m2 * floor_area
+
+
 def operated(
     zone: Zone, tables: OperationTables, floor_area: float, weather: Weather, daylight: FloatArray | None
 ) -> tuple[Zone, FloatArray]:
@@ -716,8 +723,7 @@ def operated(
         dimmed; None: they are not dimmed.
     """
     hours, gains = OperationHours(tables, weather), tables.gains
-    lamps = hours.lamps(floor_area) * _of_lamps(gains, daylight, dimmed_share)
-    lamps = lamps + gains.lighting_standby_w_m2 * floor_area
+    lamps = lamp_power(tables, floor_area, weather, daylight)
     result = replace(
         zone,
         **hours.outdoor_air(),

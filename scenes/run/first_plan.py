@@ -77,6 +77,7 @@ def plan_options(options: RoomOptions) -> RoomOptions:
         sky_subdivision=1,
         annual_glare=False,
         spectral=False,
+        sensitivities=False,
         sensor_spacing=max(options.grid.spacing, SPACING),
         **fewer,
     )

@@ -160,6 +160,8 @@ def _write_room(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
         _csv(pd.DataFrame([room.spectral.summary]), place / "melanopic_year.csv", index=False)
         write_table(sensor_table(room.spectral.melanopic, times), place / "melanopic.parquet")
         write_table(eye_spectrum(room.spectral, times), place / "eye_spectrum.parquet")
+    if room.sensitivities is not None:
+        _csv(room.sensitivities, place / "sensitivities.csv", index=False)
     _csv(pd.DataFrame([heat.comfort_summary]), place / "comfort.csv", index=False)
     for picture in room.glare.pictures:
         name = f"view_{times[picture.hour]:%m-%d_%Hh}"

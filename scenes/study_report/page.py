@@ -32,7 +32,7 @@ from scenes.report.model3d import ColourLayer, Model3D, colour_bytes, model3d
 from scenes.report.names import glossary, quantity, rooms_counted, systems_counted
 from scenes.report.page_files import page_files
 from scenes.report.tables import Column, Table
-from scenes.report.verdict import MOST_ROOMS, Verdict, limits
+from scenes.report.verdict import MOST_ROOMS, Verdict, assumed_thermal, limits
 from scenes.result_folder import EXPLORER
 from scenes.results import RoomYear, RunResult
 from scenes.study.explored import PHASED
@@ -80,6 +80,8 @@ def study_verdict(study: StudyResult) -> Verdict:
         (gettext("Heat and energy"), _heat),
     )
     sentences = tuple((heading, sentence(study)) for heading, sentence in result)
+    if assumed := assumed_thermal(study.head.assumed):
+        sentences = (*sentences[:-1], (sentences[-1][0], f"{sentences[-1][1]} {assumed}"))
     limited = _limited(study)
     rows = [(case_label(study, case), room, own) for case, room, own, _ in limited]
     return Verdict(
@@ -270,7 +272,7 @@ def _filled(study: StudyResult, page: PageOptions, done: Sequence[tuple[int, Cas
             left_out=len(done) - len(pages),
             model=study_model(study),
             has_outdoors=any(b.elements for b, _ in study.plan.rooms.values()),
-            problems=tables.issues_table(study.issues),
+            problems=tables.problems_table(study.issues),
             inputs=inputs_table(study),
             mean_error=share(sum(errors) / len(errors) / 100),
             worst_error=share(worst / 100),

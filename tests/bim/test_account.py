@@ -274,7 +274,7 @@ def test_issues_by_their_glass_and_alike_ones_once():
     first, second, third = ranked([*small, big, room])
     assert (first.first, first.count, first.glass) == (big, 1, 3.0)
     assert second.first is room
-    assert third.count == 19 and third.text().what == "19 times: wall 0: its body is no closed solid"
+    assert third.count == 19 and third.text().what == "19 times: wall 0: its body is not a closed solid"
 
 
 def roof_opening(beside: str):

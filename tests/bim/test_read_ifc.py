@@ -60,6 +60,23 @@ def test_sound_room(tmp_path, schema, unit):
     assert (building.latitude_deg, building.longitude_deg) == (48.5, -7.5)
 
 
+@pytest.mark.parametrize(
+    ("long_name", "name", "shown"),
+    [
+        ("Town hall", "12", "Town hall"),
+        ("// PROJECT/NAME //", "// PROJECT/NUMBER //", "model"),  # Revit's templates
+        ("项目名称", "Project  Number", "model"),
+        ("Nombre de proyecto", "4711", "4711"),
+        (None, "Project of a school", "Project of a school"),
+    ],
+)
+def test_a_project_that_has_its_templates_name_has_the_files(tmp_path, long_name, name, shown):
+    model = box_room("IFC4")
+    (project,) = model.by_type("IfcProject")
+    project.LongName, project.Name = long_name, name
+    assert read(tmp_path, model).name == shown
+
+
 @pytest.mark.parametrize("ends", [(0.1,), (0.1, 0.2), (0.05, 0.1, 0.25)])
 def test_a_wall_whose_layers_are_bodies_that_touch_ends_outdoors(tmp_path, ends):
     """Revit writes a body for each layer; where two touch a ray meets one surface."""

@@ -48,6 +48,11 @@ def test_x_runs_to_the_right_seen_from_outdoors():
     np.testing.assert_allclose(window.centre, [0.45, 0.0, 1.5], atol=1e-12)
 
 
+def test_windows_are_named_or_numbered():
+    named, other = WindowRectangle(0.2, 1, 0.5, 1, name="S"), WindowRectangle(2.0, 1, 0.5, 1)
+    assert [window.name for window in shoebox(windows=(named, other)).windows] == ["S", "window 2"]
+
+
 def test_areas_of_glass_frame_and_wall():
     space = shoebox(4, 6, 3, windows=MANY, recess=0.2).spaces[0]
     glass = 0.88 * 1.38

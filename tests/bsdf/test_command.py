@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import bsdf_radiance as radiance
 import numpy as np
 import pytest
@@ -75,11 +77,36 @@ def test_info_of_an_even_sheet(shade):
     text = run("info", shade).stdout
     normal = next(line for line in text.splitlines() if "normal" in line).split()
     assert normal[2:] == ["0.1000", "0.5000", "0.1000", "0.5000"]
+    # as from all directions of an angle: one row for it, and one for diffuse light
+    assert text.count("  all  ") == 8 * text.count("direct-hemispherical")
+    diffuse = next(line for line in text.splitlines() if "diffuse" in line).split()
+    assert diffuse[1:] == ["0.1000", "0.5000", "0.1000", "0.5000"]
+
+
+def test_info_parts_the_directions_of_a_blind(blind):
+    """A venetian blind transmits light from the sky and from the ground unlike."""
+    rows = [line.split()[:2] for line in run("info", blind).stdout.splitlines()]
+    assert ["40", "sky"] in rows and ["40", "ground"] in rows and ["40", "all"] not in rows
+
+
+def test_a_combination_says_what_its_layers_lack(tmp_path, shade):
+    """A layer without a Solar band takes it from the system; one without reflection is black."""
+    bands = {"Visible": read_bsdf_xml(shade).band("Visible")}
+    dark = BsdfFile({"Visible": replace(bands["Visible"], reflection_front=None)}, name="dark")
+    both = BsdfFile({"Visible": bands["Visible"], "Solar": bands["Visible"]}, name="both")
+    for file in (dark, both):
+        write_bsdf_xml(file, tmp_path / f"{file.name}.xml")
+    text = run("combine", tmp_path / "both.xml", tmp_path / "dark.xml", "--out", tmp_path / "system.xml").stdout
+    assert "warning: dark.xml: no Solar band, so the system has none" in text
+    assert "warning: dark.xml: Visible reflection front is absent" in text
+    assert "state u_value, g_value and shading_position in system.toml" in text
+    sound = run("combine", tmp_path / "both.xml", tmp_path / "both.xml", "--out", tmp_path / "two.xml").stdout
+    assert "warning" not in sound
 
 
 def test_a_missing_band_is_stated_wherever_its_values_are_printed(tmp_path, dummy_back):
     """tau_e and g_tot of a file with a Visible band alone are those of light."""
-    assert "note: no Solar band: results use the Visible band instead" in run("info", dummy_back).stdout
+    assert "no Solar band -> results use the Visible band instead" in run("info", dummy_back).stdout
     flat = np.full((145, 145), 0.3 / np.pi)
     shade = tmp_path / "shade.xml"
     write_bsdf_xml(BsdfFile({"Visible": KlemsBsdf(KLEMS_FULL, KLEMS_FULL, *4 * [flat])}), shade)
@@ -91,7 +118,7 @@ def test_a_missing_band_is_stated_wherever_its_values_are_printed(tmp_path, dumm
 
 def test_check_finds_what_is_planted(dummy_back):
     text = run("check", dummy_back)  # the back reflects 0.8 and, reversed, transmits 0.4
-    assert "transmission back: passes nothing" in text.stdout
+    assert "transmission back: transmits nothing" in text.stdout
     assert "no Solar band" in text.stdout
     assert "the sun's 0.533 degree disc" in text.stdout
 

@@ -12,6 +12,7 @@ from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.metrics import en17037
 from mitsuba_cfs.sky.epw import read_epw
+from mitsuba_cfs.sky.matrix import sky_series
 from scenes.comply.assess import (
     NOT_COMPUTED,
     NOT_FOR_IT,
@@ -23,7 +24,7 @@ from scenes.comply.assess import (
 )
 from scenes.comply.eye_needs import EyeDays
 from scenes.comply.findings import EyeLight, Findings, GridLight, SeatGlare, calendar_of
-from scenes.comply.rules import NOT_MET, read_rule, rule_names
+from scenes.comply.rules import NOT_MET, read_rule, rule_named, rule_names
 from scenes.comply.sunlight import SunExposure
 from scenes.comply.tables import missed
 from scenes.comply.uses import RoomUse
@@ -85,6 +86,17 @@ def test_daylight_factors_are_those_of_table_a3(calendar):
         factor[9] = least / 100  # 45 % of the area alone has the target
         findings = Findings(london, light(np.zeros((8760, 20)), factor=factor + 0.0005))
         assert reached("en17037", findings)["daylight_factor"] != name
+
+
+def test_a_weather_file_without_illuminance_has_its_median_by_efficacy():
+    """By the efficacy that gives Reykjavik's printed median: tests/metrics/test_outdoor.py."""
+    weather = read_epw(WEATHER)
+    stated = calendar_of(weather)
+    derived = calendar_of(replace(weather, diffuse_horizontal_illuminance=None))
+    assert stated.stated_illuminance and not derived.stated_illuminance
+    assert stated.median_diffuse == 15_900.0  # of the file's column
+    expected = en17037.median_diffuse(sky_series(weather).diffuse_horizontal, stated.daylight)
+    assert derived.median_diffuse == expected != stated.median_diffuse
 
 
 def test_rooflights_have_a_table_of_their_own(calendar):
@@ -297,6 +309,29 @@ def test_an_own_rule_file_is_read(tmp_path):
     assert read_rule(str(path)).criterion[0].level[0].name == "yes"
     with pytest.raises(DataError, match="no rule 'en17073'"):
         read_rule("en17073")
+
+
+@pytest.mark.parametrize(
+    "written, rule",
+    [
+        ("EN 17037", "en17037"),
+        ("DIN 4108-2", "din4108-2"),
+        ("WELL v2", "well-v2"),
+        ("LEED", "leed-v4.1"),
+        ("LM-83", "lm83"),
+    ],
+)
+def test_a_standard_is_named_as_it_is_written(written, rule):
+    assert rule_named(written) == rule
+    assert read_rule(written) == read_rule(rule)
+
+
+@pytest.mark.parametrize(
+    "written, said", [("WELL", "may be each of well-v2, well-v2-l03"), ("LM-83-23", "no rule"), ("--", "no rule")]
+)
+def test_a_name_that_means_no_single_rule_is_refused(written, said):
+    with pytest.raises(DataError, match=said):
+        rule_named(written)
 
 
 def test_size_of_a_cell():

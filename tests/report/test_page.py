@@ -16,8 +16,10 @@ from PIL import Image
 from bim.account import Account, StoreyAccount
 from bim.report.issue import Effect, Issue, issue_text
 from scenes.report.glare_figures import gallery
-from scenes.report.page import report_html, tied, write_report
+from scenes.report.names import option_words
+from scenes.report.page import options_table, remaining, report_html, tied, write_report
 from scenes.results import GlareResults
+from scenes.run.options import JobOptions
 from tests.report.synthetic import run_result
 
 LARGEST = 12e6  # bytes, as asked of a run of two rooms with pictures of 600 pixels
@@ -92,6 +94,23 @@ def test_hashes_versions_seed_issues_and_notes_are_shown(result, page) -> None:
         assert issue_text(issue, "command").consequence in page
 
 
+def test_each_option_of_a_run_is_named_and_explained() -> None:
+    options = JobOptions(None, None).named()
+    shown = options_table({"options": options}).rows
+    files = ("building", "weather", "system")
+    assert len(shown) == len(options) - len(files)
+    unnamed = [key for key in options if option_words(key)[0] == key.replace("_", " ")]
+    assert unnamed == [*files] and all(meaning for *_, meaning in shown)
+    assert not {"True", "False", "None"} & {value for _, value, _ in shown}
+
+
+def test_the_table_of_the_run_holds_no_data_of_other_tables(result) -> None:
+    head = {"model": ["Model: usable"], "issues": [{"code": "no-name"}], "assumed": ["A note."]}
+    manifest = {**result.manifest, "head": head, "weather_notes": []}
+    assert "{&#39;code" not in report_html(replace(result, manifest=manifest))
+    assert "head" not in remaining(manifest) and "weather_notes" not in remaining(manifest)
+
+
 def test_account_stands_in_the_head_and_alike_issues_once(result) -> None:
     storey = StoreyAccount("E0", 3, 4, 20.0, 9.0)
     account = Account((storey,), 9, 4, 0.0, 11.0, 0.0, 0.0, 0.0, low=("A gym",))
@@ -103,7 +122,7 @@ def test_account_stands_in_the_head_and_alike_issues_once(result) -> None:
     assert "9.0 of 20.0 m² of exterior glass used" in head
     assert "not usable: only 45 % of the exterior glass is used" in head
     assert "3 of 4 spaces" in head and "A gym" in head
-    assert "19 times: wall 0: its body is no closed solid" in rest and "wall 7: its" not in rest
+    assert "19 times: wall 0: its body is not a closed solid" in rest and "wall 7: its" not in rest
     assert rest.index("no room behind it") < rest.index("19 times")
 
 

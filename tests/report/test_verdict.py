@@ -7,12 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mitsuba_cfs.notes import Note
+from scenes.head import NO_HEAD
 from scenes.language.numbers import percent
 from scenes.report.headline import cards
 from scenes.report.page import report_html
 from scenes.report.verdict import verdict
 from tests.report.building_page import building
 from tests.report.synthetic import run_result
+from thermal.gvalue import thermal_data
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +47,16 @@ def test_glare_names_its_hour_its_sun_and_its_cause(result) -> None:
     assert text.startswith("Glare is imperceptible in all pictures; the highest DGP is 0.30")
 
 
+def test_a_dgp_at_the_end_of_its_scale_has_no_error_and_a_small_error_no_digits(result) -> None:
+    limited = _with_glare(result, dgp=1.0, ev=15000.0, dgp_standard_error=0.0001)
+    assert "DGP 1.00 (" in said(limited, "Glare")
+    shown = verdict(limited, [cards(limited, room) for room in limited.spaces]).limits.shown
+    (row,) = [row for row in shown.rows if row[1] == "Highest glare"]
+    assert row[4] == "none: DGP ends at 1"
+    small = _with_glare(result, dgp=0.5, ev=5000.0, dgp_standard_error=0.0001)
+    assert "DGP 0.50 ± less than 0.001 (" in said(small, "Glare")
+
+
 def test_warmth_counts_the_hours_of_the_warmest_room(result) -> None:
     text = said(result, "Overheating")
     counts = []
@@ -58,6 +71,16 @@ def test_warmth_counts_the_hours_of_the_warmest_room(result) -> None:
     cold = room.heat.temperatures.assign(operative_c=20.0)
     one = replace(room, heat=replace(room.heat, temperatures=cold))
     assert said(replace(result, spaces=(one,)), "Overheating").startswith("No occupied hour exceeds 26")
+
+
+def test_assumed_thermal_values_stand_beside_the_temperatures(result) -> None:
+    """The notes are those of the thermal model itself, as a run's head has them."""
+    named = []
+    for known in ({}, {"u_value": 1.1}, {"u_value": 1.1, "g_normal": 0.6}):
+        data = thermal_data([0.47], [0.2], item="Blind", **known)
+        head = replace(NO_HEAD, assumed=tuple(Note(one.template, **one.values) for one in data.assumptions))
+        named.append("assumed U- or g-values: Blind." in said(replace(result, head=head), "Overheating"))
+    assert named == [True, True, False]
 
 
 def test_of_rooms_warm_in_every_hour_the_hottest_is_named(result) -> None:

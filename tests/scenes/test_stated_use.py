@@ -104,8 +104,8 @@ def test_gains_and_leaks_that_nobody_states_are_named(used):
     assert not unstated_note(whole, building, "use.toml")
     (note,) = unstated_note(RoomOptions(), building)
     assert note == (
-        "equipment_w_m2 = 8.0, person_w = 75.0, floor_per_person = 15.0, occupied = [8, 18], "
-        "infiltration_ach = 0.5, as no operation file states gains and air."
+        "Gains and air, as no operation file states them: equipment 8 W/m2, one person of 75 W per 15 m2, "
+        "both daily from 8 to 18 o'clock; 0.5 air changes per hour."
     )
     both = replace(used, uses={space.guid: used.uses["Office"] for space in used.spaces})
     assert not unstated_note(OperationTables(), both, "use.toml")

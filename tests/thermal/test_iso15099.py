@@ -127,6 +127,18 @@ def test_g_counts_what_each_layer_sends_inwards():
     assert fractions[0] < 0.15 and fractions[1] > 0.7
 
 
+@pytest.mark.parametrize("shift", [0.0, 0.1])
+@pytest.mark.parametrize("apart", [(-5.0, 20.0), (5.0, 20.0), (20.0, 45.0), (35.0, 60.0), (27.0, 33.0)])
+def test_resistance_of_panes_is_that_of_their_balance(apart, shift):
+    """Where the gas begins to turn in the gap six coefficients were up to 3 % off: 0.2 K of a sunny room."""
+    u_value = iso15099_data(DOUBLE).u_value
+    data = iso15099_data(DOUBLE, 1.0 / (1.0 / u_value + shift))
+    balance = unit_balance(DOUBLE, prescribed(*apart))
+    outer, inner = balance.faces_c[0], balance.faces_c[-1]
+    exact = (inner - outer) / -balance.heat_in + shift
+    assert data.resistance.at(0.5 * (inner + outer), outer - inner) == pytest.approx(exact, rel=2e-3)
+
+
 def test_blackbox_of_the_layers_gives_their_u_and_films():
     data = iso15099_data(shaded("internal"))
     fenestration = with_realised_films(
@@ -362,10 +374,7 @@ def test_reference_glazing_comes_out_of_its_layers():
     # the same layers in WINDOW's engine
     assert data.u_value == pytest.approx(stored["U"][0]["U"], rel=1e-3)
     assert data.r_inner == pytest.approx(stored["U"][0]["R_i"], rel=1e-3)
-    fit = json.loads((WINDOW_GLAZING / "blackbox_R.json").read_text())["dgu_fit"]
-    mean, difference = np.array([0.0, 10.0, 25.0]), np.array([10.0, 20.0, 5.0])
-    x, c = mean - 10, fit
-    stored_c = c[0] + c[1] * x + c[2] * difference + c[3] * difference**2
-    stored_c = stored_c + c[4] * x * difference + c[5] * x**2
-    # two fits of 1.3 % rms each to nearly the same points
-    np.testing.assert_allclose(data.resistance.at(mean, difference), 1 / stored_c, rtol=0.02)
+    points = json.loads((WINDOW_GLAZING / "blackbox_R.json").read_text())["dgu"]
+    outer, inner, resistance = (np.array([point[key] for point in points]) for key in ("Tso", "Tsi", "R"))
+    table = data.resistance.at(0.5 * (inner + outer), inner - outer)
+    np.testing.assert_allclose(table, resistance, rtol=2.5e-3)  # 1/R linear between points 2 K apart

@@ -99,7 +99,13 @@ def test_wind_profile():
 def test_glass_film_near_the_plane_wall():
     # by hand at 290.65 K: Ra = 9.81 * 10 * 1.5^3 / (290.65 * 1.49e-5 * 2.10e-5) = 3.64e9, laminar,
     # Nu = 0.56 Ra^(1/4) = 137.6, h = 137.6 * 0.0254 / 1.5; property tables agree to 2 %
-    assert iso15099_inside(10.0, 20.0, 1.5) == pytest.approx(2.33, rel=0.02)
+    assert iso15099_inside(10.0, 20.0, 1.5, 101325.0) == pytest.approx(2.33, rel=0.02)
+
+
+def test_glass_film_is_weaker_in_thin_air():
+    """Laminar: Nu as the fourth root of Ra, which goes with the square of the density."""
+    sea, mountain = (iso15099_inside(15.0, 20.0, 1.5, pressure) for pressure in (101325.0, 81060.0))
+    assert mountain == pytest.approx(sea * 0.8**0.5, rel=1e-9)
 
 
 def test_room_light_is_conserved():

@@ -85,9 +85,9 @@ def test_cells_hold_the_places_that_their_rays_start_from_and_others_do_not_matt
     share = sunlit_sensors.room_shares((narrow, wide), inside, sensors, samples=256)
     between, sent = sunlit_sensors._between, []
 
-    def of_all(cells, scene, met, seed):
+    def of_all(cells, scene, met, *options):
         sent.append(len(met))
-        return between(cells, scene, np.arange(cells.cells.size), seed)
+        return between(cells, scene, np.arange(cells.cells.size), *options)
 
     monkeypatch.setattr(sunlit_sensors, "_between", of_all)
     all_rows = sunlit_sensors.room_shares((narrow, wide), inside, sensors, samples=256)

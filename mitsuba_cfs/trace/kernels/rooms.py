@@ -86,11 +86,16 @@ def _side(count: int) -> int:
     return int(np.ceil(count ** (1 / 3) - 1e-9))
 
 
+def surface_counts(parts: Sequence[Surfaces]) -> list[int]:
+    """How many numbers of surfaces each part has where several are joined."""
+    return [max(int(p.surface.max(initial=-1)) + 1, len(p.gloss)) for p in parts]
+
+
 def joined_surfaces(parts: Sequence[Surfaces]) -> Surfaces:
     """Surfaces of several rooms, numbered one after the other."""
     if len(parts) == 1:
         return parts[0]
-    counts = [max(int(p.surface.max(initial=-1)) + 1, len(p.gloss)) for p in parts]
+    counts = surface_counts(parts)
     firsts = np.cumsum([0, *counts])
     return Surfaces(
         np.concatenate([p.triangles for p in parts]),

@@ -6,6 +6,7 @@ import drjit as dr
 import mitsuba as mi
 
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
+from mitsuba_cfs.trace.kernels.bounce_counts import BounceCounts
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.kernels.sampling import lattice_2d, opaque
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene
@@ -33,6 +34,8 @@ def add_view_paths(
     mirrored: mi.Vector3f | None,  # where paths go that start by a surface's gloss
     light: PatchLight | None,  # rows of the hours' luminance, not of the patches
     room: mi.UInt32 | None,  # of each path, in a scene of several
+    bounces: BounceCounts | None,  # adds the derivatives by reflectance to layers behind the matrix
+    counted: mi.UInt32 | None,  # bounces before the start
 ) -> None:
     """Add beta * d(irradiance at the start) / d(radiance of each patch) to the matrix.
 
@@ -51,6 +54,8 @@ def add_view_paths(
     early = carried is not None
     carried = mi.Float(1.0 if carried is None else carried)  # product of reflectances so far
     entry, later = mi.UInt32(entry), mi.UInt32(later)  # copies: the loop changes them
+    counts = mi.UInt32(0 if counted is None else counted)
+    counting = bounces is not None
     area = tracer.window_area(room)
     shiny = tracer.gloss is not None
     by_gloss = mi.Bool(mirrored is not None)  # the path goes on as a mirror sends it
@@ -82,6 +87,8 @@ def add_view_paths(
         patch = mi.UInt32(group) * K + bins.index(local)
         if dr.hint(light is None, mode="scalar"):
             dr.scatter_add(matrix, mi.Float64(beta * value), entry + patch, visible)
+            if dr.hint(counting, mode="scalar"):
+                bounces.add(matrix, beta * value, counts, entry + patch, visible)
         drawn, drawn_value = mi.UInt32(patch), dr.select(visible, beta * value, 0.0)
 
         # ----- Next direction: cosine about the normal -----
@@ -107,6 +114,8 @@ def add_view_paths(
         patch = mi.UInt32(group_hit) * K + bins.index(local)
         if dr.hint(light is None, mode="scalar"):
             dr.scatter_add(matrix, mi.Float64(beta * value), entry + patch, glazed)
+            if dr.hint(counting, mode="scalar"):
+                bounces.add(matrix, beta * value, counts, entry + patch, glazed)
         else:
             first = dr.select(depth == 0, none, width)
             met_value = dr.select(glazed, beta * value, 0.0)
@@ -118,6 +127,8 @@ def add_view_paths(
             glossy, onwards, rho = tracer.gloss.leave(hit.prim_index, normal, direction, rho, generator, active)
             beta *= dr.select(by_gloss, 1.0, dr.pi) * dr.select(glossy, 1.0, dr.inv_pi)
             by_gloss = mi.Bool(glossy)
+        if dr.hint(counting, mode="scalar"):
+            counts += bounces.met(tracer, hit.prim_index, active & ~by_gloss)
         beta *= rho
         carried *= rho
         depth += 1
@@ -150,6 +161,7 @@ def add_mirrored(
     max_depth: mi.UInt32,
     active: mi.Bool,
     room: mi.UInt32 | None = None,
+    bounces: BounceCounts | None = None,
 ) -> None:
     """Add the light that the gloss of surfaces reflects to rays with first hits `hit`."""
     position, face, _ = tracer.surface_at(hit, origin, direction, active)
@@ -172,4 +184,6 @@ def add_mirrored(
         mirrored=onwards,
         light=None,
         room=room,
+        bounces=bounces,
+        counted=None,
     )

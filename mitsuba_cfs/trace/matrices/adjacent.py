@@ -20,10 +20,12 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
 from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
-from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.surfaces import SurfaceGroups, Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
+from mitsuba_cfs.trace.kernels.bounce_counts import BounceCounts
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
+from mitsuba_cfs.trace.kernels.rooms import surface_counts
 from mitsuba_cfs.trace.kernels.sampling import (
     batch_key,
     empty_sums,
@@ -160,6 +162,7 @@ def window_exchange(
     max_depth: int = 32,
     stopping: Stopping | None = None,
     seed: int = 0,
+    by_groups: SurfaceGroups | None = None,
     cache: MatrixCache | None = None,
     scenes: SceneCache | None = None,
 ) -> Estimate:
@@ -173,10 +176,15 @@ def window_exchange(
     Args:
         surfaces: what the room is made of, in the band of the radiances.
         samples: paths for each patch in each batch.
+        by_groups: of the surfaces; W is followed by its derivatives by ln(rho) of these, in the last axis
+            [G, K, (1 + N) * G * K].
     """
     scenes = SceneCache() if scenes is None else scenes
     tracer, bins, n = scenes.scene(surfaces, groups), DirectionBins(basis), int(samples)
-    columns = len(groups) * bins.size
+    width = len(groups) * bins.size
+    layers = 1 if by_groups is None else 1 + len(by_groups.names)
+    columns = layers * width
+    bounces = None if by_groups is None else BounceCounts([by_groups], surface_counts([surfaces]), width)
 
     def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
         normal = tracer.exterior_normal(paths.group)
@@ -189,10 +197,12 @@ def window_exchange(
             mi.Bool(True),
             row=paths.row,
             beta=mi.Float(1),
+            layers=layers,
             stream=paths.stream,
             sample=paths.sample,
             generator=paths.generator,
             max_depth=dr.opaque(mi.UInt32, max_depth),
+            bounces=bounces,
         )
 
     return accumulate(
@@ -200,7 +210,17 @@ def window_exchange(
         stopping=stopping,
         label="window exchange",
         entry=cache_entry(
-            cache, "window exchange", surfaces, groups, basis, n, max_depth, seed, by=__name__, stopping=stopping
+            cache,
+            "window exchange",
+            surfaces,
+            groups,
+            basis,
+            n,
+            max_depth,
+            seed,
+            *(() if by_groups is None else (by_groups.number,)),
+            by=__name__,
+            stopping=stopping,
         ),
     )
 

@@ -18,6 +18,7 @@ from mitsuba_cfs.images.view import View, pixel_directions, pixel_rays
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
+from mitsuba_cfs.trace.kernels.bounce_counts import BounceCounts
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.kernels.pixel_rows import numbered
 from mitsuba_cfs.trace.kernels.sampling import (
@@ -194,14 +195,17 @@ def add_seen_and_reflected(
     *,
     row: mi.UInt32,
     beta: mi.Float,
+    layers: int = 1,
     **paths: Any,
 ) -> None:
     """Add what each ray shows to its row: the window patch that it meets, or reflected light.
 
-    Args: paths: `stream` to `max_depth` of `add_picture_paths`.
+    Args:
+        layers: of each row, with `bounces` one more than groups.
+        paths: `stream` to `bounces` of `add_picture_paths`.
     """
     hit, patch, glazed = seen_patch(tracer, bins, eye, direction, active)
-    entry = row * opaque(bins.size * len(tracer.groups), mi.UInt32)
+    entry = row * opaque(layers * bins.size * len(tracer.groups), mi.UInt32)
     dr.scatter_add(matrix, mi.Float64(beta), entry + patch, glazed)
     add_picture_paths(
         tracer,
@@ -238,6 +242,7 @@ def add_picture_paths(
     generator: mi.PCG32,
     max_depth: mi.UInt32,
     light: PatchLight | None,  # of `add_view_paths`; without gloss alone
+    bounces: BounceCounts | None = None,
 ) -> None:
     """Add rho / pi E of the surface that each lane meets, by one path; nothing for a window.
 
@@ -264,6 +269,8 @@ def add_picture_paths(
         mirrored=None,
         light=light,
         room=None,
+        bounces=bounces,
+        counted=None if bounces is None else bounces.met(tracer, hit.prim_index, active),
     )
     if tracer.gloss is not None:
         add_mirrored(
@@ -281,4 +288,5 @@ def add_picture_paths(
             generator=mirrors,
             max_depth=max_depth,
             active=active,
+            bounces=bounces,
         )

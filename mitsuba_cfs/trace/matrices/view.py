@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import drjit as dr
 import mitsuba as mi
@@ -20,10 +21,11 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBasis
 from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
-from mitsuba_cfs.surfaces import Surfaces, WindowGroup
+from mitsuba_cfs.surfaces import SurfaceGroups, Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
+from mitsuba_cfs.trace.kernels.bounce_counts import MOST_BOUNCES, BounceCounts
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, cache_entry
-from mitsuba_cfs.trace.kernels.rooms import TracedRoom, of_rooms
+from mitsuba_cfs.trace.kernels.rooms import TracedRoom, of_rooms, surface_counts
 from mitsuba_cfs.trace.kernels.sampling import (
     Ranges,
     batch_key,
@@ -72,9 +74,17 @@ class _Sensors:
     counts: NDArray[np.int64]  # [R] sensors of each room
     widths: NDArray[np.int64]  # [R] entries of a row
     entries: NDArray[np.int64]  # [R] where the room's rows begin; as many again at the end
+    by_groups: tuple[SurfaceGroups, ...] = ()  # [R] whose reflectances V is derived by; none: by none
+    surfaces: tuple[int, ...] = ()  # [R] numbers of surfaces of each room
 
     @classmethod
-    def of(cls, tracer: TracedScene, bins: DirectionBins, rooms: Sequence[TracedRoom]) -> _Sensors:
+    def of(
+        cls,
+        tracer: TracedScene,
+        bins: DirectionBins,
+        rooms: Sequence[TracedRoom],
+        by_groups: Sequence[SurfaceGroups] = (),
+    ) -> _Sensors:
         """The sensors of the rooms of a scene."""
         counts = np.array([len(room.points) for room in rooms])
         widths = bins.size * np.array([len(room.groups) for room in rooms])
@@ -93,7 +103,18 @@ class _Sensors:
             counts,
             widths,
             entries,
+            tuple(by_groups),
+            tuple(surface_counts([room.surfaces for room in rooms])),
         )
+
+    @property
+    def layers(self) -> int:
+        """Of matrices: V, and its derivatives."""
+        return 1 + (len(self.by_groups[0].names) if self.by_groups else 0)
+
+    def bounces(self, stride: int) -> BounceCounts | None:
+        """What adds derivatives to layers of so many entries; None without derivatives."""
+        return BounceCounts(self.by_groups, self.surfaces, stride) if self.by_groups else None
 
     @property
     def firsts(self) -> NDArray[np.int64]:
@@ -133,7 +154,7 @@ def _launches(of: _Sensors, blocks: Sequence[_Block]) -> Iterator[list[_Block]]:
     launch: list[_Block] = []
     total = 0
     for block in blocks:
-        size = block.points * int(of.widths[block.room])
+        size = block.points * int(of.widths[block.room]) * of.layers
         if launch and total + size > ROW_ENTRIES:
             yield launch
             launch, total = [], 0
@@ -145,7 +166,9 @@ def _launches(of: _Sensors, blocks: Sequence[_Block]) -> Iterator[list[_Block]]:
 def indirect_rows(
     of: _Sensors, blocks: Sequence[_Block], *, max_depth: int, key: mi.UInt32
 ) -> list[NDArray[np.float64]]:
-    """Interreflected part of the view matrix of some blocks of sensors [C, G * K] each.
+    """Interreflected part of the view matrix of some blocks of sensors [N, C, G * K] each.
+
+    N are the matrix and its derivatives by the reflectances of groups of surfaces.
 
     Each sensor's cosine-distributed rays meet the room in `hits` points.  At every point x the
     row of its own irradiance, V(x), is estimated by `paths` paths; every sensor s takes all points
@@ -181,7 +204,8 @@ def indirect_rows(
 
     widths = of.widths[[block.room for block in blocks]]
     entries = np.cumsum([0, *(points * widths)])
-    rows = empty_sums(int(entries[-1]))
+    size, counter = int(entries[-1]), of.bounces(int(entries[-1]))
+    rows = empty_sums(of.layers * size)
     paths = Ranges(points * [block.paths for block in blocks])
     _add_paths(
         of,
@@ -189,12 +213,13 @@ def indirect_rows(
         paths,
         blocks,
         entries[:-1],
-        (position, face, weight),
+        (position, face, weight, triangle),
+        bounces=counter,
         first_point=first_point,
         max_depth=max_depth,
         key_of=key_of,
     )
-    rows, weight = rows.numpy(), weight.numpy()
+    rows, weight = sums_of(rows, (of.layers, size)), weight.numpy()
     estimates, ends = [], np.cumsum(points)
     for i, block in enumerate(blocks):
         shape = block.sensors, block.points
@@ -205,7 +230,7 @@ def indirect_rows(
         share = share / (block.hits * np.where(total > 0, total, 1.0))
         if left is not None:
             seen = seen * left[some].reshape(shape)
-        of_block = rows[entries[i] : entries[i + 1]].reshape(block.points, -1)
+        of_block = rows[:, entries[i] : entries[i + 1]].reshape(of.layers, block.points, -1)
         estimates.append((seen * share) @ of_block)
     return estimates
 
@@ -216,15 +241,16 @@ def _add_paths(
     paths: Ranges,
     blocks: Sequence[_Block],
     entries: NDArray[np.int64],
-    points: tuple[mi.Point3f, mi.Vector3f, mi.Float],
+    points: tuple[mi.Point3f, mi.Vector3f, mi.Float, mi.UInt32],
     *,
+    bounces: BounceCounts | None,
     first_point: mi.UInt32,
     max_depth: int,
     key_of: Callable[[mi.UInt32], mi.UInt32],
 ) -> None:
     """Add the row of irradiance at each point of some blocks.
 
-    Args: points: position, normal and reflectance; first_point: of each block.
+    Args: points: position, normal, reflectance and triangle; first_point: of each block.
     """
     room = np.array([block.room for block in blocks])
     count = np.array([block.paths for block in blocks])
@@ -237,7 +263,10 @@ def _add_paths(
     each = dr.maximum(each, 1)  # where no lane is, too
     hit, key = path // each, key_of(block)
     point = hit + dr.gather(mi.UInt32, first_point, block)
-    position, face, weight = points
+    position, face, weight, triangle = points
+    active, counted = dr.gather(mi.Float, weight, point) > 0, None
+    if bounces is not None:
+        counted = bounces.met(of.tracer, dr.gather(mi.UInt32, triangle, point), active)
     add_view_paths(
         of.tracer,
         of.bins,
@@ -251,11 +280,13 @@ def _add_paths(
         stream=mi.sample_tea_32(hit, key ^ mi.UInt32(0x3C6EF372))[0],
         generator=path_generator(path, key ^ mi.UInt32(0xA54FF53A)),
         max_depth=dr.opaque(mi.UInt32, max_depth - 1),
-        active=dr.gather(mi.Float, weight, point) > 0,
+        active=active,
         carried=dr.gather(mi.Float, weight, point),
         mirrored=None,
         light=None,
         room=of_room,
+        bounces=bounces,
+        counted=counted,
     )
 
 
@@ -351,6 +382,7 @@ def _add_mirrored(of: _Sensors, matrix: mi.Float64, *, samples: int, max_depth: 
             max_depth=dr.opaque(mi.UInt32, max_depth - 1),
             active=hit.is_valid(),
             room=room,
+            bounces=of.bounces(int(of.entries[-1])),
         )
 
 
@@ -479,7 +511,7 @@ def view_matrix(
     balance heuristic of Veach, Guibas 1995.
     """
     room = TracedRoom(surfaces, tuple(groups), *sensors_of(points, directions))
-    ((estimate, _),) = views_of_rooms(
+    (views,) = views_of_rooms(
         [room],
         basis=basis,
         samples=samples,
@@ -490,13 +522,22 @@ def view_matrix(
         cache=cache,
         scenes=scenes,
     )
-    return estimate
+    return views.whole
+
+
+class RoomViews(NamedTuple):
+    """View matrices of the sensors of a room [S, G, K], from the same rays."""
+
+    whole: Estimate
+    direct: Estimate | None  # without interreflection; None: not asked for
+    by_reflectance: tuple[Estimate, ...]  # derivative by ln(rho) of each group of surfaces
 
 
 def views_of_rooms(
     rooms: Sequence[TracedRoom],
     *,
     with_direct: bool = False,
+    by_groups: Sequence[SurfaceGroups] = (),
     basis: KlemsBasis = KLEMS_FULL,
     samples: int = 4096,
     max_depth: int = 32,
@@ -505,20 +546,28 @@ def views_of_rooms(
     progress: Progress = silent,
     cache: MatrixCache | None = None,
     scenes: SceneCache | None = None,
-) -> list[tuple[Estimate, Estimate | None]]:
+) -> list[RoomViews]:
     """`view_matrix` of several rooms, traced together, and their direct parts from the same rays.
 
     The random numbers of a room do not depend on the other rooms: each matrix is that of the room
     alone but for the rounding of coordinates.
 
-    Args: with_direct: the matrices with a depth of 1 besides, entry by entry a part of the others.
+    Args:
+        with_direct: the matrices with a depth of 1 besides, entry by entry a part of the others.
+        by_groups: of the surfaces of each room, as many in each: derivatives by their reflectances, from
+            the same paths; none by default.
     """
     n, scenes = int(samples), SceneCache() if scenes is None else scenes
     bins, depths = DirectionBins(basis), (max_depth, 1) if with_direct else (max_depth,)
+    if by_groups and max_depth > MOST_BOUNCES:
+        raise ValueError(f"max_depth: at most {MOST_BOUNCES} with derivatives, got {max_depth}")
+    groups = len(by_groups[0].names) if by_groups else 0
+    derived = [(f"view matrix by reflectance {i}", max_depth) for i in range(groups)]
+    layers = [*(("view matrix", depth) for depth in depths), *derived]
     entries = [
         cache_entry(
             cache,
-            "view matrix",
+            label,
             room.surfaces,
             room.groups,
             room.points,
@@ -527,16 +576,18 @@ def views_of_rooms(
             n,
             depth,
             seed,
+            *(() if label == "view matrix" else (by_groups[number].number,)),
             by=__name__,
             stopping=stopping,
         )
-        for depth in depths
-        for room in rooms
+        for label, depth in layers
+        for number, room in enumerate(rooms)
     ]
 
     def traced(some: Sequence[int]) -> Callable[[int], NDArray[np.float64]]:
         placed, tracer = scenes.together([rooms[i] for i in some])
-        return _batches(_Sensors.of(tracer, bins, placed), n, depths, seed)
+        of = _Sensors.of(tracer, bins, placed, [by_groups[i] for i in some] if by_groups else ())
+        return _batches(of, n, depths, seed)
 
     estimates = of_rooms(
         rooms,
@@ -546,10 +597,12 @@ def views_of_rooms(
         stopping=stopping,
         label="view matrix",
         progress=progress,
-        layers=len(depths),
+        layers=len(layers),
     )
-    count = len(rooms)
-    return list(zip(estimates[:count], estimates[count:] or [None] * count, strict=True))
+    of_layers = [estimates[i : i + len(rooms)] for i in range(0, len(estimates), len(rooms))]
+    whole, direct = of_layers[0], of_layers[1] if with_direct else [None] * len(rooms)
+    by_reflectance = zip(*of_layers[len(depths) :], strict=True) if groups else [()] * len(rooms)
+    return [RoomViews(*views) for views in zip(whole, direct, map(tuple, by_reflectance), strict=True)]
 
 
 def _batches(of: _Sensors, samples: int, depths: Sequence[int], seed: int) -> Callable[[int], NDArray[np.float64]]:
@@ -564,20 +617,21 @@ def _batches(of: _Sensors, samples: int, depths: Sequence[int], seed: int) -> Ca
     blocks = of.blocks(samples) if max_depth > 1 else []
 
     def batch(number: int) -> NDArray[np.float64]:
-        matrix = empty_sums(int(of.entries[-1]))
+        size = int(of.entries[-1])
+        matrix = empty_sums(of.layers * size)
         key = batch_key(seed, number)
         _add_direct(of, matrix, samples=samples, key=key)
-        direct = [] if len(depths) == 1 else [np.array(sums_of(matrix, (int(of.entries[-1]),)))]
+        direct = [] if len(depths) == 1 else [np.array(sums_of(matrix, (size,)))]
         if of.tracer.gloss is not None and max_depth > 1:
             _add_mirrored(of, matrix, samples=samples, max_depth=max_depth, key=key)
-        values = sums_of(matrix, (int(of.entries[-1]),))
+        values = sums_of(matrix, (of.layers, size))
         for launch in _launches(of, blocks) if blocks else ():
             added = indirect_rows(of, launch, max_depth=max_depth, key=key)
             for block, rows in zip(launch, added, strict=True):
                 first = of.entries[block.room]
                 first += (block.first - of.firsts[block.room]) * of.widths[block.room]
-                values[first : first + rows.size] += rows.ravel()
-        return np.concatenate([values, *direct]).reshape(-1, of.bins.size)
+                values[:, first : first + rows[0].size] += rows.reshape(of.layers, -1)
+        return np.concatenate([values[0], *direct, *values[1:]]).reshape(-1, of.bins.size)
 
     return batch
 

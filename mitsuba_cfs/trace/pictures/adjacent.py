@@ -260,6 +260,8 @@ class _MetInRoom:
             mirrored=None,
             light=None,
             room=None,
+            bounces=None,
+            counted=None,
         )
 
 

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from mitsuba_cfs.surfaces import SurfaceGroups
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, tables
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_faces
@@ -83,35 +84,80 @@ def room_shares(
         sensors: positions and normals [S, 3].
         samples: rays of each sensor.
     """
+    (shares,) = shares_and_derivatives(cells, inside, sensors, samples=samples, seed=seed)
+    return shares
+
+
+def shares_and_derivatives(
+    cells: tuple[RoomCells, ReflectingCells],
+    inside: TracedScene,
+    sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
+    *,
+    samples: int,
+    seed: int = 0,
+    by_groups: SurfaceGroups | None = None,
+) -> NDArray[np.float64]:
+    """`room_shares`, then its derivatives by ln(rho) of groups of surfaces [1 + N, S, c].
+
+    W' = A' + (A' + A' F + ...) F + (A + A F + ...) F'
+    """
     points, normals = (np.atleast_2d(v) for v in sensors)
     local = SurfacePoints((points - inside.centre).astype(np.float32), normals.astype(np.float32))
     narrow, wide = cells[0], cells[1].cells
     every = np.arange(local.size)
-    first = _reflected(narrow, inside, local, every, local.size, samples=samples, seed=seed ^ 0x6A09E667)
+    numbers = None if by_groups is None else by_groups.number
+    layers = 1 if by_groups is None else 1 + len(by_groups.names)
+    first = _reflected(
+        narrow,
+        inside,
+        local,
+        every,
+        local.size,
+        samples=samples,
+        seed=seed ^ 0x6A09E667,
+        numbers=numbers,
+        layers=layers,
+    )
     entries = np.ones(narrow.size), (np.arange(narrow.size), cells[1].of)
-    step = (first @ sparse.csr_array(entries, shape=(narrow.size, wide.size))).toarray()
-    between = _between(cells[1], inside, np.flatnonzero(step.any(axis=0)), seed)
-    whole, found = step.sum(), np.zeros_like(step)
+    joined = sparse.csr_array(entries, shape=(narrow.size, wide.size))
+    steps = np.stack([(one @ joined).toarray() for one in first])
+    between = _between(cells[1], inside, np.flatnonzero(steps[0].any(axis=0)), seed, numbers, layers)
+    whole, found = steps[0].sum(), np.zeros_like(steps)
     for _ in range(BOUNCES):
-        step = step @ between
-        found += step
-        if step.sum() <= LAST * (whole + found.sum()):
+        met = steps[0]
+        steps = np.stack([step @ between[0] for step in steps])
+        for number in range(1, layers):
+            steps[number] += met @ between[number]
+        found += steps
+        if steps[0].sum() <= LAST * (whole + found[0].sum()):
             break
-    return first.toarray() / narrow.area + (found / wide.area)[:, cells[1].of]
+    narrowly = np.stack([one.toarray() for one in first])
+    shares: NDArray[np.float64] = narrowly / narrow.area + (found / wide.area)[..., cells[1].of]
+    return shares
 
 
-def _between(wide: ReflectingCells, inside: TracedScene, met: NDArray[np.int64], seed: int) -> sparse.csr_array:
-    """What cells have of each other [w, w]: of those that some meet, and of what these meet.
+def _between(
+    wide: ReflectingCells,
+    inside: TracedScene,
+    met: NDArray[np.int64],
+    seed: int,
+    numbers: NDArray[np.int64] | None,
+    layers: int,
+) -> list[sparse.csr_array]:
+    """What cells have of each other [w, w], and its derivatives: of those that some meet, and of what these meet.
 
     The others, most of them the backs of walls, have no part in any sensor's light.
     """
     size = wide.cells.size
-    found, known = sparse.csr_array((size, size)), np.zeros(size, dtype=bool)
+    found, known = [sparse.csr_array((size, size)) for _ in range(layers)], np.zeros(size, dtype=bool)
     while len(met):
         known[met] = True
-        found = found + _reflected(wide.cells, inside, wide.starts, met, size, samples=wide.rays, seed=seed)
+        added = _reflected(
+            wide.cells, inside, wide.starts, met, size, samples=wide.rays, seed=seed, numbers=numbers, layers=layers
+        )
+        found = [one + more for one, more in zip(found, added, strict=True)]
         others = np.zeros(size, dtype=bool)
-        others[found.indices] = True
+        others[found[0].indices] = True
         met = np.flatnonzero(others & ~known)
     return found
 
@@ -143,14 +189,20 @@ def _reflected(
     *,
     samples: int,
     seed: int,
-) -> sparse.csr_array:
+    numbers: NDArray[np.int64] | None = None,
+    layers: int = 1,
+) -> list[sparse.csr_array]:
     """Irradiance of rows by a unit of irradiance on each cell that their rays meet [count, c].
+
+    Followed by its derivatives by ln(rho) of groups of surfaces.
 
     Args:
         starts: [count * n] places that the rays of each row start from, in turn.
         rows: those that rays are sent from; the others are empty.
+        numbers: of each surface's group [F]; None: no derivatives.
     """
-    n, found = starts.size // max(count, 1), sparse.csr_array((count, cells.size))
+    n = starts.size // max(count, 1)
+    found = [sparse.csr_array((count, cells.size)) for _ in range(layers)]
     block, key = max(1, RAYS // samples), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
     points, normals = starts.points(), starts.normals()
     for begin in range(0, len(rows), block):
@@ -169,8 +221,18 @@ def _reflected(
         rho = inside.whole(hit.prim_index, way, met)
         met &= rho > 0
         cell = cells.of(*hit_faces(inside, point, way, hit, met), met)
-        cell, rho = tables(cell, rho)
-        kept = np.flatnonzero(cell >= 0)
-        entries = rho[kept].astype(float) / samples, (some[kept // samples], cell[kept])
-        found = found + sparse.csr_array(sparse.coo_array(entries, shape=found.shape))
+        known = [cell, rho]
+        if numbers is not None:
+            slant = dr.abs(dr.dot(dr.gather(mi.Vector3f, inside.normal, hit.prim_index, met), way))
+            known += [dr.gather(mi.UInt32, inside.surface, hit.prim_index, met)]
+            known += [inside.diffuse(hit.prim_index, slant, met)]
+        cell, rho, *of_surface = tables(*known)
+        for layer in range(layers):
+            there, weight = cell >= 0, rho
+            if layer and numbers is not None:
+                surface, weight = of_surface
+                there = there & (numbers[surface] == layer - 1)
+            kept = np.flatnonzero(there)
+            entries = weight[kept].astype(float) / samples, (some[kept // samples], cell[kept])
+            found[layer] = found[layer] + sparse.csr_array(sparse.coo_array(entries, shape=(count, cells.size)))
     return found
