@@ -21,6 +21,8 @@ from scenes.study.store import Store
 from scenes.toml_file import read_table
 from tests.design.designs import BLIND, COOLING, ENERGY, PLAIN, RULE, TILT, WIDTH, by_formula, design_file
 
+pytestmark = pytest.mark.early
+
 BOX_KEY = '[[variable]]\nkey = "room.box.window.{}"\nvalues = [1.0, 2.0]\n'
 WRONG = {
     "no variable": (PLAIN + ENERGY, "variable: is missing"),
