@@ -9,22 +9,32 @@ from pathlib import Path
 import click
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
+from scipy.interpolate import BarycentricInterpolator
 
 from bim.radiance.cell import read_radiance_layer
 from mitsuba_cfs.bsdf import klems
 from mitsuba_cfs.bsdf.blinds import venetian_blind, vertical_louvre
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.checks import missing_data
+from mitsuba_cfs.bsdf.colour import with_visible
 from mitsuba_cfs.bsdf.evaluate import klems_of
 from mitsuba_cfs.bsdf.fabric_table import FabricShade, named_fabric, read_fabric_table
+from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial, plastic
 from mitsuba_cfs.bsdf.screens import fabric_klems, perforated_screen, pleated_shade, prism_panel, woven_screen
 from mitsuba_cfs.bsdf.shade_file import read_shade_file
+from mitsuba_cfs.bsdf.spectral_factor import SlatLight
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, silent
+from mitsuba_cfs.spectra.detectors import visible_mean
+from scenes.fenestration.thermal_file import read_reflectance, reflectance_of_code
 
+SHEETS = ("venetian", "louvre", "perforated", "woven", "pleated")  # shapes of one material
+# shares of the largest reflectance at which coloured sheets are traced: zeros of Chebyshev's polynomial and the ends
+LEVELS = (1 - np.cos(np.linspace(0, np.pi, 5))) / 2
 BASES = {"full": klems.KLEMS_FULL, "half": klems.KLEMS_HALF, "quarter": klems.KLEMS_QUARTER}
 
 
@@ -39,14 +49,27 @@ def generated_file(
     name: str,
     fabrics: Path | None = None,
     fabric: str | None = None,
+    spectrum: Path | None = None,
+    colour: str | None = None,
     progress: Progress = silent,
     **options,
-) -> tuple[BsdfFile, str]:
-    """The layer's BSDF file (Visible and Solar), and how exact it is in words."""
+) -> tuple[BsdfFile, str, SlatLight | None]:
+    """The layer's BSDF file (Visible and Solar), how exact it is in words, and its light by wavelength.
+
+    Args: spectrum: CSV file of the sheets' reflectance; colour: "#rrggbb" instead.  None: grey.
+    """
+    reflectance = None
+    if spectrum is not None or colour is not None:
+        if options["shape"] not in SHEETS or tensor_tree is not None or basis != "full":
+            raise click.UsageError(f"--spectrum and --colour need --shape {', '.join(SHEETS)} and --basis full")
+        if spectrum is not None and colour is not None:
+            raise click.UsageError("--spectrum and --colour exclude each other")
+        reflectance = _sheet_reflectance(spectrum, colour, options["visible"])
+        options["visible"] = float(visible_mean(reflectance))
     if options["shape"] == "fabric":
         if tensor_tree is not None:
             raise click.UsageError("--shape fabric is written on a Klems basis, as no tensor tree")
-        return fabric_file(fabrics=fabrics, fabric=fabric, basis=basis, name=name)
+        return *fabric_file(fabrics=fabrics, fabric=fabric, basis=basis, name=name), None
     if fabrics is not None or fabric is not None:
         raise click.UsageError("--fabrics and --fabric belong to --shape fabric")
     product = options["product"]
@@ -55,15 +78,16 @@ def generated_file(
     from mitsuba_cfs.bsdf.generate import generate_klems, generate_tensor_tree
 
     notes: list[str] = []
+    levels = () if reflectance is None else tuple(float(reflectance.max()) * LEVELS)
     try:
-        layer = described_layer(notes=notes, **options)
+        layer = described_layer(notes=notes, levels=levels, **options)
     except DataError:
         raise
     except ValueError as error:  # sizes that do not go together
         raise click.UsageError(str(error)) from None
     if tensor_tree is None:
         result = generate_klems(layer, BASES[basis], samples=paths, seed=seed, progress=progress)
-        systems, area = result.bsdf, BASES[basis].projected_solid_angles()[:, None]
+        systems, area = result.bsdf[:2], BASES[basis].projected_solid_angles()[:, None]
         worst = max(
             float(np.sqrt(((area * block) ** 2).sum(axis=0)).max())
             for error in result.error
@@ -77,6 +101,11 @@ def generated_file(
         leaves = sum(len(tree.values) for tree in systems[0].blocks().values())
         merged = f"{100 * bound:.0f} % and three" if bound else "three"
         exact = f"{leaves} leaves, merged within {merged} standard errors of a cell's value"
+    slats = None
+    if reflectance is not None:
+        of_levels = result.bsdf[2:]
+        slats = slat_light([area[:, 0] @ one.transmission_front for one in of_levels], levels, reflectance)
+        systems = (visible_bsdf(of_levels, levels, reflectance), systems[1])
     exact += "".join(f"\nnote: {note}" for note in notes)
     bands = dict(zip(("Visible", "Solar"), systems, strict=True))
     file = BsdfFile(bands, name=name or options["shape"], thickness=layer.thickness)
@@ -84,7 +113,40 @@ def generated_file(
         shade = read_shade_file(product)
         file = replace(file, name=name or shade.name, manufacturer=shade.manufacturer)
         exact += f"\nas one of the layers of a .toml: {shade.thermal_layer()}"
-    return file, exact
+    return file, exact, slats
+
+
+def slat_light(
+    passed: Sequence[NDArray[np.float64]], levels: Sequence[float], reflectance: NDArray[np.float64]
+) -> SlatLight:
+    """Transmittance by wavelength of sheets of a reflectance [N], from that at a few reflectances.
+
+    Args: passed: [K] at each level; levels: reflectances, 0 first, the largest last.
+    """
+    whole = BarycentricInterpolator(np.array(levels), np.array(passed))(reflectance).T
+    return SlatLight(passed[0], np.clip(whole, passed[0][:, None], 1.0))
+
+
+def visible_bsdf(systems: Sequence[KlemsBsdf], levels: Sequence[float], reflectance: NDArray[np.float64]) -> KlemsBsdf:
+    """The mean over visible light of sheets of a reflectance [N], from systems at a few reflectances.
+
+    More than at the mean reflectance: light that is reflected twice grows with its square.
+    """
+    weights = visible_mean(BarycentricInterpolator(np.array(levels), np.eye(len(levels)))(reflectance).T)
+    blocks = [one.blocks() for one in systems]
+    means = {name: sum(w * of[name] for w, of in zip(weights, blocks, strict=True)) for name in blocks[0]}
+    return replace(systems[0], **{name: np.maximum(mean, 0.0) for name, mean in means.items()})
+
+
+def _sheet_reflectance(spectrum: Path | None, colour: str | None, visible: float | None) -> NDArray[np.float64]:
+    """Reflectance of the sheets [N]; that of visible light as stated, if it is."""
+    try:
+        shape = read_reflectance(spectrum) if spectrum is not None else reflectance_of_code(str(colour))
+    except DataError:
+        raise
+    except ValueError as error:
+        raise click.UsageError(f"--{error}") from None
+    return shape if visible is None else with_visible(shape[None], np.array([visible]))[0]
 
 
 def fabric_file(*, fabrics: Path | None, fabric: str | None, basis: str, name: str) -> tuple[BsdfFile, str]:
@@ -158,10 +220,11 @@ def described_layer(
     specular: float,
     roughness: float,
     notes: list[str],
+    levels: Sequence[float] = (),
 ) -> PeriodicLayer:
-    """The layer that the options of the command line describe, in two channels.
+    """The layer that the options of the command line describe, in two channels, and some more of sheets.
 
-    Args: notes: takes what the user should know of the layer.
+    Args: notes: takes what the user should know of the layer; levels: reflectances of more channels.
     """
     if shape == "product":
         _needed(shape, product=product)
@@ -181,7 +244,7 @@ def described_layer(
             channels=2,
         )
     _needed(shape, spacing_mm=spacing_mm, visible=visible)
-    colour = (visible, visible if solar is None else solar)
+    colour = (visible, visible if solar is None else solar, *levels)
     sheet = plastic("sheet", *colour, specular=specular, roughness=roughness)
     spacing, thickness = spacing_mm / 1000, thickness_mm / 1000
     if shape in ("perforated", "woven"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +21,42 @@ ANGLES = np.radians(np.arange(0.0, 89.1, 1.0))  # up to grazing incidence, where
 PATCH_ANGLES = 32  # angles of incidence in each patch, for its mean
 
 
+@dataclass(frozen=True, slots=True)
+class SlatLight:
+    """Transmittance of coloured slats by patch of incidence of the full Klems basis and wavelength."""
+
+    straight: Array  # [K] of what black slats pass: light between them, which has no colour
+    whole: Array  # [K, N] at `NANOMETRES`, with what the slats reflect
+
+    def __post_init__(self) -> None:
+        shape = KLEMS_FULL.size, len(NANOMETRES)
+        if self.straight.shape != shape[:1] or self.whole.shape != shape:
+            raise ValueError(f"slats: expected {shape[0]} patches and {shape[1]} wavelengths, got {self.whole.shape}")
+
+    @property
+    def straight_share(self) -> Array:
+        """Share of visible light that passes between the slats [K]; 1 where none passes."""
+        return _relative(self.straight, self.straight + visible_mean(self._reflected))
+
+    @property
+    def _reflected(self) -> Array:
+        reflected: Array = np.maximum(self.whole - self.straight[:, None], 0.0)
+        return reflected
+
+    def relative(self, channels: Channels) -> tuple[Array, Array]:
+        """r_c of all light and of the reflected part alone [C, K]."""
+        visible, means = visible_mean(self._reflected), channels.mean(self._reflected).T
+        return _relative(self.straight + means, self.straight + visible), _relative(means, visible)
+
+
+class PatchFactors(NamedTuple):
+    """r_c of patches of incidence [C, K]."""
+
+    whole: Array  # of all light that a system passes
+    scattered: Array  # of what does not pass straight on
+    straight: Array  # of what does
+
+
 @dataclass(frozen=True)
 class SpectralFactor:
     """Transmittance of a system by angle of incidence and wavelength, relative to visible light.
@@ -30,6 +67,7 @@ class SpectralFactor:
     transmittance: Array  # [A, N] at `ANGLES` and `NANOMETRES`, of any scale
     whole: bool = True  # of all its layers; otherwise the rest passes all wavelengths equally
     mirrored: Array | None = None  # [N] reflectance of its room side for diffuse light; None: neutral
+    slats: SlatLight | None = None  # coloured ones besides
 
     @staticmethod
     def of_panes(panes: Sequence[SpectralPane], shade: ArrayLike = 1.0, reflectance: ArrayLike = 0.0) -> SpectralFactor:
@@ -72,14 +110,18 @@ class SpectralFactor:
         x, y, z = (self.transmittance @ (observer / observer.sum(axis=0))).T
         return relative_rgb(x, y, z)
 
-    def of_patches(self, channels: Channels) -> Array:
-        """r_c of the patches of the full Klems basis [C, K], by their means of transmittance."""
+    def of_patches(self, channels: Channels) -> PatchFactors:
+        """r_c of the patches of the full Klems basis, by their means of transmittance."""
         places = (np.arange(PATCH_ANGLES) + 0.5) / PATCH_ANGLES
         theta, _ = KLEMS_FULL.angles_within(np.arange(KLEMS_FULL.size)[:, None], places, 0.5)
         theta = np.minimum(theta, ANGLES[-1])
         visible = np.interp(theta, ANGLES, self.visible).mean(axis=1)
         means = [np.interp(theta, ANGLES, row).mean(axis=1) for row in channels.mean(self.transmittance).T]
-        return _relative(np.array(means), visible)
+        panes = _relative(np.array(means), visible)
+        if self.slats is None:
+            return PatchFactors(panes, panes, panes)
+        whole, reflected = self.slats.relative(channels)
+        return PatchFactors(panes * whole, panes * reflected, panes)
 
 
 def _relative(means: Array, visible: Array) -> Array:

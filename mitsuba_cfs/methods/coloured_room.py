@@ -176,9 +176,8 @@ def _with(interior: Surfaces, values: Array) -> Surfaces:
 
 def _in_band(matrices: PhaseMatrices, interior: Surfaces) -> PhaseMatrices:
     """The matrices of the same room with other reflectances: V, and W where it has been traced."""
-    scene = replace(matrices.scene, interior=interior)
+    scene = replace(matrices.scene, interior=interior, by_groups=None)
     other = with_sensors(replace(matrices, scene=scene, sensors=None, exchange=None, view=None, sunlit=None))
-    other = replace(other, direct_sensors=matrices.direct_sensors)
     return with_exchange(other, indoors=matrices.exchange is not None)
 
 

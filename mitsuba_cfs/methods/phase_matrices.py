@@ -409,21 +409,27 @@ def has_sharp_beam(matrices: PhaseMatrices, g: int) -> bool:
 
 
 def with_sensors(matrices: PhaseMatrices, *, progress: Progress = silent) -> PhaseMatrices:
-    """The matrices with V of the scene's sensors, and V_d where the straight beam is apart."""
+    """The matrices with V of the scene's sensors, and V_d where the straight beam is apart.
+
+    V_d of other reflectances is that of these: where it is known, it is not traced again.
+    """
     if matrices.sensors is not None:
         return matrices
+    known = matrices.direct_sensors
     room = TracedRoom(matrices.scene.interior, matrices.parts.groups, *sensors_of(*matrices.scene.sensors()))
     (views,) = views_of_rooms(
         [room],
         by_groups=() if matrices.scene.by_groups is None else (matrices.scene.by_groups,),
         max_depth=INDOOR_DEPTH,
-        with_direct=any(has_sharp_beam(matrices, g) for g in range(len(matrices.scene.groups))),
+        with_direct=known is None and any(has_sharp_beam(matrices, g) for g in range(len(matrices.scene.groups))),
+        direct=known,
         progress=part(progress, 0.3, 1.0, "daylight"),
         cache=matrices.cache,
         scenes=matrices.scenes,
         **_view_options(matrices.sampling),
     )
-    return _with_views(matrices, views)
+    whole = _with_views(matrices, views)
+    return whole if known is None else replace(whole, direct_sensors=known)
 
 
 def _with_views(matrices: PhaseMatrices, views: RoomViews) -> PhaseMatrices:

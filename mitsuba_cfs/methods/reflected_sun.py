@@ -15,12 +15,13 @@ the five-phase method computes this light at points that represent the outdoor s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from mitsuba_cfs.methods.coefficients import GroupCoefficients, beam_matrix, direct_daylight, without_straight
 from mitsuba_cfs.methods.phase_matrices import PhaseMatrices
@@ -28,6 +29,7 @@ from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.surfaces import SurfaceGroups
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
+from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.reflected import Straight, outdoor_light, view_shares, window_shares
 from mitsuba_cfs.trace.sun.sunlit_cells import Beam, RoomCells
@@ -37,6 +39,7 @@ BATCHES = 4  # each with its own paths and points
 WINDOW_SHARE = 32  # paths of a patch for D, for each that looks for sunlit surfaces
 SENSOR_SHARE = 4  # paths of a sensor for V, for each that looks for them
 ROOM_SHARE = 2  # paths of a sensor for V, for each that looks for the room's cells
+MOST_FLUX = 1 << 24  # entries of the stored fluxes together: 200 MB
 Array = NDArray[np.floating]
 
 
@@ -50,6 +53,8 @@ class ReflectedSun:
     outside: TracedScene  # what is in front of the window parts, in the room's coordinates
     before: tuple[NDArray[np.float32], ...]  # [BATCHES][Q, K, h] luminance outside the windows
     by_patches: Array  # D - D_d [Q, K, P], which it replaces; 0 without outdoor surfaces
+    # flux on the room's cells [c, BATCHES * h] by group and scattering, for other sensors and reflectances
+    fluxes: dict[tuple[int, int], tuple[Scattering, sparse.csr_array]] = field(default_factory=dict)
 
     @property
     def suns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -67,7 +72,7 @@ class ReflectedSun:
         number = np.searchsorted(self.shining, hours)
         up = np.isin(hours, self.shining)
         before = tuple(values[..., number[up]] for values in self.before)
-        return replace(self, sky=self.sky.part(hours), shining=np.flatnonzero(up), before=before)
+        return replace(self, sky=self.sky.part(hours), shining=np.flatnonzero(up), before=before, fluxes={})
 
 
 @dataclass(frozen=True)
@@ -163,14 +168,23 @@ def beams_by_batch(
     if not rooms:
         return np.zeros((BATCHES, 0, S, h))
     stacked = [np.concatenate([room.shares[b] for room in rooms]) for b in range(BATCHES)]
-    light = room_light(rooms[0].cells, stacked, _beam(matrices, sun, group, g), sun.suns)
+    light = room_light(stacked, _flux(matrices, sun, rooms[0].cells, group, g), sun.suns[1])
     return np.stack(light).reshape(BATCHES, len(rooms), S, h)
 
 
-def _beam(matrices: PhaseMatrices, sun: ReflectedSun, group: GroupCoefficients, g: int) -> Beam:
-    """The sun's beam through a group, from points on it."""
+def _flux(
+    matrices: PhaseMatrices, sun: ReflectedSun, cells: RoomCells, group: GroupCoefficients, g: int
+) -> sparse.csr_array:
+    """Flux of the sun's beam through a group on the room's cells [c, BATCHES * h], stored with the sun."""
+    scattering = group.optics.scattering
+    key = g, id(scattering)
+    if key in sun.fluxes:
+        return sun.fluxes[key][1]
     scenes, points = (sun.inside, sun.outside), matrices.sampling.sun_points
-    return Beam(scenes, g, group.optics.scattering, points, tuple(_seeds(matrices)))
+    flux = Beam(scenes, g, scattering, points, tuple(_seeds(matrices))).flux(cells, sun.suns[0])
+    if flux.nnz + sum(other.nnz for _, other in sun.fluxes.values()) <= MOST_FLUX:
+        sun.fluxes[key] = scattering, flux
+    return flux
 
 
 def _outdoors_seen(
@@ -205,7 +219,7 @@ def _to_sensors(
     parts, in_room = matrices.parts.of(g), []
     rest = [without_straight(matrices, group, q) for q in parts]
     if room is not None and beam_matrix(group.optics).any():
-        in_room = room_light(room.cells, room.shares, _beam(matrices, sun, group, g), sun.suns)
+        in_room = room_light(room.shares, _flux(matrices, sun, room.cells, group, g), sun.suns[1])
 
     def light_of(batch: int) -> NDArray[np.float64]:
         """The light of the sensors in the hours with sun [S, h]."""

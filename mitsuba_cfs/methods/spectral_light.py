@@ -5,6 +5,8 @@ of incidence (rank one: spectrum of the panes, times angles of the visible band)
 
     T_c(out, in) = T(out, in) r_c(in),    r_c = tau_c / tau_v of its panes
 
+(of coloured slats that of the light between them and that of the light they reflect, each with its r_c),
+
 so that nothing is traced again where the surfaces reflect all channels equally: V, D and their kin
 are those of the visible band, and what was traced through a group is scaled by its factor at the
 angle that it came from.  Rooms with colour are traced in a few bands q of reflectance
@@ -32,11 +34,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mitsuba_cfs.bsdf.spectral_factor import ANGLES, SpectralFactor
+from mitsuba_cfs.bsdf.spectral_factor import ANGLES, PatchFactors, SpectralFactor
 from mitsuba_cfs.methods.coefficients import (
     GroupCoefficients,
     direct_daylight,
     direct_sensor_matrix,
+    sensor_matrix,
     sun_shares,
     without_straight,
 )
@@ -138,6 +141,7 @@ def spectral_light(
     reflectance: Array | None = None,
     water_cm: ArrayLike = WATER_CM,
     clear: str = "cie",
+    ground: Array | None = None,
     progress: Progress = silent,
 ) -> SpectralLight:
     """What detectors receive of the light of the sensors.
@@ -148,6 +152,7 @@ def spectral_light(
         state: of each window group in each hour [G, L]; the first by default.
         water_cm: precipitable water of the atmosphere [L] or of all hours.
         clear: spectrum of a clear sky, one of `SKY_SPECTRA`.
+        ground: reflectance of the ground [N], of any scale; neutral by default.
 
     Raises: `ValueError` for path tracing, which has no matrices.
     """
@@ -162,7 +167,7 @@ def spectral_light(
         if not isinstance(phase, PhaseLight):
             raise ValueError("path tracing has no matrices: expected the light of a phase method")
         water = np.broadcast_to(np.asarray(water_cm, dtype=float), (hours_of_all,))[hours]
-        skies = sky_spectra(phase.sky, water, clear)
+        skies = sky_spectra(phase.sky, water, clear, ground=ground)
         season = _Season(with_sensor_light(phase), factors, channels, skies, reflectance)
         outdoors += season.sky.horizontal.sum(axis=0)
         rows = states_of(phase, None if state is None else state[:, hours])
@@ -178,8 +183,10 @@ def spectral_light(
     return SpectralLight(tuple(received), outdoors)
 
 
-def sky_spectra(sky: AnnualSky, water_cm: ArrayLike = WATER_CM, clear: str = "cie") -> SpectralSky:
-    """The spectra of the skies, grounds and suns of hours; clear: one of `SKY_SPECTRA`."""
+def sky_spectra(
+    sky: AnnualSky, water_cm: ArrayLike = WATER_CM, clear: str = "cie", *, ground: Array | None = None
+) -> SpectralSky:
+    """The spectra of the skies, grounds and suns of hours, as of `spectral_sky`."""
     luminance = sky.without_sun()
     return spectral_sky(
         luminance,
@@ -188,6 +195,7 @@ def sky_spectra(sky: AnnualSky, water_cm: ArrayLike = WATER_CM, clear: str = "ci
         sky.direction[:, 2],
         water_cm,
         clear,
+        ground=ground,
     )
 
 
@@ -228,7 +236,7 @@ class _Season:
             for states, traced in zip(light.systems, groups, strict=True)
         )
         systems = [
-            [ModeOptics(one, of.patches[m], k) for one, of, k in zip(states, angles, mirrored, strict=True)]
+            [ModeOptics(one, of.patches.whole[m], k) for one, of, k in zip(states, angles, mirrored, strict=True)]
             for states, angles, mirrored in zip(light.systems, self._angles, room.mirrored, strict=True)
         ]
         return replace(light, matrices=room.matrices, systems=systems, sensors=sensors)
@@ -302,9 +310,9 @@ class _Modes:
 
 def _modes(factors: Sequence[SpectralFactor], channels: Channels) -> tuple[Array, list[_Angles]]:
     """Modes of the factors of systems: their shares in the channels [C, M], and the systems'."""
-    patches = [factor.of_patches(channels) for factor in factors]
-    angles = [factor.of_angles(channels) for factor in factors]
-    whole = np.concatenate([*patches, *angles], axis=1)
+    parts = [(*factor.of_patches(channels), factor.of_angles(channels)) for factor in factors]
+    each = [one for of in parts for one in of]
+    whole = np.concatenate(each, axis=1)
     left, size, right = np.linalg.svd(whole, full_matrices=False)
     count = 1
     while count < len(size):
@@ -312,24 +320,57 @@ def _modes(factors: Sequence[SpectralFactor], channels: Channels) -> tuple[Array
         if np.abs(rest).max() <= MODE_ERROR:
             break
         count += 1
-    widths = np.cumsum([one.shape[1] for one in (*patches, *angles)])[:-1]
-    split = np.split(right[:count], widths, axis=1)
-    pairs = zip(split[: len(factors)], split[len(factors) :], strict=True)
-    return left[:, :count] * size[:count], [_Angles(*pair) for pair in pairs]
+    split = iter(np.split(right[:count], np.cumsum([one.shape[1] for one in each])[:-1], axis=1))
+    found = []
+    for factor in factors:
+        patches = PatchFactors(*(next(split) for _ in PatchFactors._fields))
+        share = None if factor.slats is None else factor.slats.straight_share
+        found.append(_Angles(patches, next(split), share))
+    return left[:, :count] * size[:count], found
 
 
 @dataclass(frozen=True, slots=True)
 class _Angles:
     """Factors of a system in all modes."""
 
-    patches: Array  # [M, K] of the patches of incidence
+    patches: PatchFactors  # [M, K] of the patches of incidence
     angles: Array  # [M, A] at `ANGLES`
+    straight_share: Array | None  # [K] of visible light that passes straight on; None: all has one colour
+
+    def scattered(self, optics: SystemOptics) -> Array | None:
+        """The part of T that has a colour of its own [K, K], of the visible band; None: none."""
+        if self.straight_share is None:
+            return None
+        T = optics.transmission
+        return T - np.diag(np.minimum(self.straight_share * T.sum(axis=0), np.diag(T)))
 
     def towards(self, group: WindowGroup, directions: Array) -> NDArray[np.float32]:
         """Factors of light from directions [n, 3] on a window group [M, n]."""
         theta = np.arccos(np.clip(directions @ group.frame[2], 0.0, 1.0))
         rows = [np.interp(theta, ANGLES, row) for row in self.angles]
         return np.array(rows, dtype=np.float32)
+
+
+@dataclass(frozen=True, slots=True)
+class _Shares:
+    """Light of the sensors per unit luminance outside a window part, of visible light [S, K]."""
+
+    whole: Array
+    scattered: Array | None  # the part of it that has a colour of its own; None: none
+
+    @staticmethod
+    def of(whole: Array, view: Array, scattered: Array | None) -> _Shares:
+        """Those by V or V_d [S, K] and the part of T that has a colour of its own [K, K]."""
+        return _Shares(whole, None if scattered is None else view @ scattered)
+
+    def scaled(self, of: PatchFactors, m: int) -> Array:
+        """The same in a mode."""
+        scaled = self.whole * of.straight[m]
+        return scaled if self.scattered is None else scaled + self.coloured(of, m)
+
+    def coloured(self, of: PatchFactors, m: int) -> Array:
+        """What a mode's scattered light has more than if it passed straight on."""
+        return 0.0 * self.whole if self.scattered is None else self.scattered * (of.scattered[m] - of.straight[m])
 
 
 class _GroupInState:
@@ -342,14 +383,17 @@ class _GroupInState:
         self._one, self._angles, self._beam = one, angles, beam
         parts = matrices.parts.of(g)
         self._daylight = [matrices.daylight.values[q] for q in parts]
-        self._rest = [without_straight(matrices, coefficients, q) for q in parts]
-        self._by_sun: list[tuple[Array, Array]] = []
+        scattered = angles.scattered(coefficients.optics)
+        view = sensor_matrix(matrices).values
+        self._rest = [_Shares.of(without_straight(matrices, coefficients, q), view[:, q], scattered) for q in parts]
+        self._by_sun: list[tuple[_Shares, Array]] = []
         if coefficients.by_sun is not None:
-            direct = direct_daylight(matrices)
-            shares = ((sun_shares(matrices, coefficients, q), direct[q]) for q in parts)
-            self._by_sun = list(shares)
+            direct, direct_view = direct_daylight(matrices), direct_sensor_matrix(matrices)
+            for q in parts:
+                shares = _Shares.of(sun_shares(matrices, coefficients, q), direct_view[:, q], scattered)
+                self._by_sun.append((shares, direct[q]))
         self._seen = _outdoors_seen(light, coefficients, parts)
-        self._parts, self._reflected = parts, light.reflected
+        self._parts, self._reflected, self._sun = parts, light.reflected, light.sky.lit_sun
         self._straight_outdoors = one.added  # [S, L] of `added`: what is seen straight through
         if one.added is not None and one.beam_in_room is not None:
             self._straight_outdoors = one.added - one.beam_in_room
@@ -363,33 +407,34 @@ class _GroupInState:
 
     def in_mode(self, m: int) -> SensorLight:
         """The light in a mode."""
-        one, patches = self._one, self._angles.patches[m]
+        one, of = self._one, self._angles.patches
         coefficients = one.coefficients
-        whole = sum((rest * patches) @ daylight for rest, daylight in zip(self._rest, self._daylight, strict=True))
-        by_sun = None
+        straight, seen = coefficients.straight, self._seen @ of.straight[m]
+        rest = [shares.scaled(of, m) for shares in self._rest]
+        whole = sum(shares @ daylight for shares, daylight in zip(rest, self._daylight, strict=True))
+        by_sun: Array | None = None
         if coefficients.by_sun is not None:
-            by_sun = sum((shares * patches) @ daylight for shares, daylight in self._by_sun)
-        straight = coefficients.straight
+            by_sun = np.sum([shares.scaled(of, m) @ daylight for shares, daylight in self._by_sun], axis=0)
         if straight is not None:
             # what comes off the outdoors meets the window from anywhere
             direct = straight.values.values if straight.direct is None else straight.direct
             scaled = direct * self._to_sky[m]
-            whole = whole + scaled + (straight.values.values - direct) * (self._seen @ patches)
+            whole = whole + scaled + (straight.values.values - direct) * seen
             if by_sun is not None and straight.direct is not None:
                 by_sun = by_sun + scaled
         beam, added = self._to_sun[m], one.added
         if added is not None and self._beam is not None:
             added = self._beam * beam
-            added += self._straight_outdoors * (self._seen @ patches)
+            added += self._straight_outdoors * seen
             if self._reflected is not None:
-                shares = [rest * patches for rest in self._rest]
-                added += replaced_through(self._reflected, self._parts, shares)
-        optics = ModeOptics(coefficients.optics, patches)
-        return SensorLight(
-            replace(coefficients, optics=optics, whole=whole, by_sun=by_sun),
-            added,
-            None if one.sun is None else one.sun * beam,
-        )
+                added += replaced_through(self._reflected, self._parts, rest)
+        optics, sun = ModeOptics(coefficients.optics, of.whole[m]), None
+        if one.sun is not None:
+            sun = one.sun * beam
+            if self._angles.straight_share is not None:  # what is scattered of it, by patches
+                coloured = sum(shares.coloured(of, m) @ daylight for shares, daylight in self._by_sun)
+                sun += times_sky(coloured, self._sun)
+        return SensorLight(replace(coefficients, optics=optics, whole=whole, by_sun=by_sun), added, sun)
 
 
 def _outdoors_seen(light: PhaseLight, group: GroupCoefficients, parts: NDArray[np.int64]) -> NDArray[np.float64]:

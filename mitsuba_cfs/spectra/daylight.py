@@ -3,7 +3,7 @@
 sky    CIE daylight (D-series) of a correlated colour temperature that follows the luminance of
        each patch where the sky is clear and is 6514 K where it is overcast
 sun    Bird and Riordan's beam through the hour's air mass and water vapour
-ground neutral, under the whole daylight of the hour
+ground under the whole daylight of the hour, neutral by default
 
 With "spectrl2" a clear sky has the spectrum of Bird and Riordan's diffuse light on a horizontal plane,
 in all its patches; the overcast sky stays.
@@ -142,6 +142,8 @@ def spectral_sky(
     height: FloatArray,
     water_cm: ArrayLike = WATER_CM,
     clear: str = "cie",
+    *,
+    ground: FloatArray | None = None,
 ) -> SpectralSky:
     """The spectra of sky, ground and sun of hours.
 
@@ -150,6 +152,7 @@ def spectral_sky(
         weights: [P] projected solid angles of the patches for a horizontal plane; the ground's 0.
         beam: [L] normal illuminance of the sun [lx]; height: [L] sine of its altitude.
         clear: spectrum of a clear sky, one of `SKY_SPECTRA`.
+        ground: reflectance [N] of any scale; its luminance is that of `luminance`.  None: neutral.
     """
     horizontal = beam * np.maximum(height, 0.0)
     weights = np.asarray(weights, dtype=np.float32)  # as the luminances of the year
@@ -164,9 +167,10 @@ def spectral_sky(
     sun /= detected(sun)[:, :1]
     diffuse = np.stack([weights @ one for one in amount], axis=-1) @ components
     whole = diffuse + horizontal[:, None] * sun
-    lumens = detected(whole)[:, :1]
-    ground = np.divide(whole, lumens, out=sun.copy(), where=lumens > 0)
-    return SpectralSky(components, amount, whole, ground, np.asarray(luminance[0], dtype=float), sun)
+    reflected, of_sun = (whole, sun) if ground is None else (whole * ground, sun * ground)
+    lumens = detected(reflected)[:, :1]
+    per_lumen = np.divide(reflected, lumens, out=of_sun / detected(of_sun)[:, :1], where=lumens > 0)
+    return SpectralSky(components, amount, whole, per_lumen, np.asarray(luminance[0], dtype=float), sun)
 
 
 def _by_luminance(luminance: NDArray[np.floating], share: FloatArray) -> NDArray[np.float32]:

@@ -263,6 +263,8 @@ def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> Non
 @click.option("--fabric", help="Name and colour of a fabric, if the file has several.")
 @click.option("--visible", type=SHARE, help="Visible reflectance (Radiance plastic).")
 @click.option("--solar", type=SHARE, help="Solar reflectance; default: the visible one.")
+@click.option("--spectrum", type=FILE, help="CSV file of the sheets' reflectance: wavelength_nm, reflectance.")
+@click.option("--colour", metavar="#RRGGBB", help="Colour of the sheets (sRGB), in place of --spectrum.")
 @click.option("--specular", type=SHARE, default=0.0, help="Specular reflectance (Radiance plastic).")
 @click.option("--roughness", type=Number(min=0), default=0.0, help="Roughness of the specular part (Radiance plastic).")
 @basis_option
@@ -277,14 +279,23 @@ def generate(out: Path, **options) -> None:
     """Trace the BSDF of a blind, screen or Radiance geometry and write it.
 
     A fabric is not traced: its BSDF follows from what a data sheet states (ES-SO, EN 14501).
+
+    Of coloured slats or sheets the light by wavelength goes into a CSV file beside --out.
     """
     from scenes.bsdf_generation import generated_file
     from scenes.commands.progress_bar import ProgressBar
+    from scenes.fenestration.thermal_file import write_slat_light
 
-    check_file(out, inputs=[options[name] for name in ("geometry", "product", "fabrics")])
+    check_file(out, inputs=[options[name] for name in ("geometry", "product", "fabrics", "spectrum")])
+    of_slats = out.with_name(f"{out.stem}_slats.csv")
+    if options["spectrum"] is not None or options["colour"] is not None:
+        check_file(of_slats, inputs=[options["spectrum"]])
     with ProgressBar() as progress:
-        file, exact = generated_file(progress=progress, **options)
+        file, exact, slats = generated_file(progress=progress, **options)
     write_bsdf_xml(file, out)
+    if slats is not None:
+        write_slat_light(slats, of_slats)
+        exact += f'\nas [spectral] of a .toml: slats = "{of_slats.name}"'
     click.echo(f"{out}: {exact}")
 
 

@@ -11,6 +11,7 @@ EXAMPLES = {
         "cfs run house.ifc --weather city.epw --cfs blind.xml --u 1.1 --g 0.25 --out results",
         "cfs run house.ifc --weather city.epw --space Kitchen --annual-glare --out results",
         "cfs run house.ifc --weather city.epw --cfs blind.xml --sensitivities --out results",
+        "cfs run house.ifc --weather city.epw --cfs blind.xml --bands --out results",
     ),
     "comply": (
         "cfs comply --list",
@@ -63,6 +64,7 @@ EXAMPLES = {
     "bsdf generate": (
         "cfs bsdf generate --tilt-deg 45 --depth-mm 80 --spacing-mm 72 --out slats.xml",
         "cfs bsdf generate --shape perforated --openness 0.1 --out sheet.xml",
+        "cfs bsdf generate --depth-mm 80 --spacing-mm 72 --colour '#b04a3a' --out red.xml",
     ),
     "bsdf library": (
         "cfs bsdf library",

@@ -23,6 +23,7 @@ Paths are relative to the TOML file.  The angular function is for the visible ba
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -32,10 +33,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from bim.colours import linear_of_display
 from mitsuba_cfs.bsdf.angular import AngularTable, roos_table, stack_table
+from mitsuba_cfs.bsdf.colour import reflectance_of_colour
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
-from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
+from mitsuba_cfs.bsdf.spectral_factor import SlatLight, SpectralFactor
 from mitsuba_cfs.bsdf.spectral_pane import (
     VISIBLE_NM,
     SpectralPane,
@@ -45,7 +48,7 @@ from mitsuba_cfs.bsdf.spectral_pane import (
     spectral_glazing,
 )
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import reason
+from mitsuba_cfs.files import reason, write_text
 from mitsuba_cfs.spectra.detectors import NANOMETRES
 from scenes import plausible
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
@@ -68,6 +71,8 @@ ANGULAR_COLUMNS = ("theta_deg", "transmittance")
 ANGULAR_OPTIONAL = ("reflectance_front", "reflectance_back")
 SPECTRUM_COLUMNS = ("wavelength_nm", "transmittance")
 WIDEST_GAP_NM = 50.0  # between visible data of a pane, which files have every 5 to 20 nm
+REFLECTANCE_COLUMNS = ("wavelength_nm", "reflectance")
+SLAT_STEP = 10  # nanometres between the columns of a file of coloured slats
 SPECTRUM_OPTIONAL = ("reflectance",)  # of the side of a shade that faces the panes
 Film = Annotated[Positive, plausible.RESISTANCE]  # [m2 K/W]
 PATCHES = KLEMS_FULL.size
@@ -388,18 +393,26 @@ class SpectralTable(TomlTable):
 
     panes: tuple[Path, ...] = ()  # Optics or IGSDB files
     shade: Path | None = None  # CSV file of `SPECTRUM_COLUMNS`
+    slats: Path | None = None  # CSV file that `cfs bsdf generate` writes of a coloured blind
 
     @model_validator(mode="after")
     def _has_some(self) -> SpectralTable:
-        if not self.panes and self.shade is None:
-            raise ValueError("expected panes, shade or both")
+        if not self.panes and self.shade is None and self.slats is None:
+            raise ValueError("expected panes, shade or slats")
+        if self.shade is not None and self.slats is not None:
+            raise ValueError("expected shade or slats, got both")
         return self
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that it names."""
+        return (*self.panes, *(file for file in (self.shade, self.slats) if file is not None))
 
     def placed(self, folder: Path) -> SpectralTable:
         """The table with its files in a folder."""
-        shade = None if self.shade is None else folder / self.shade
+        shade, slats = (None if file is None else folder / file for file in (self.shade, self.slats))
         panes = tuple(folder / pane for pane in self.panes)
-        return self.model_copy(update={"panes": panes, "shade": shade})
+        return self.model_copy(update={"panes": panes, "shade": shade, "slats": slats})
 
     def factor(self) -> SpectralFactor:
         """Transmittance by wavelength and angle; `DataError` for a file that cannot be read."""
@@ -408,6 +421,8 @@ class SpectralTable(TomlTable):
         for file, pane in zip(self.panes, panes, strict=True):
             if fault := visible_fault(pane):
                 raise DataError(fault, file=file, field="spectral_data")
+        if self.slats is not None:  # what the slats reflect of the room's light is not known by wavelength
+            return replace(SpectralFactor.of_panes(panes), mirrored=None, slats=read_slat_light(self.slats))
         shade = (1.0, 0.0) if self.shade is None else read_spectrum(self.shade)
         return SpectralFactor.of_panes(panes, *shade)
 
@@ -445,6 +460,56 @@ def read_spectrum(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]
         message = "with a reflectance, expected shares of 1 that are 1 at most together"
         raise DataError(message, file=path)
     return np.interp(NANOMETRES, nm, tau), np.interp(NANOMETRES, nm, rho)
+
+
+SLAT_NAMES = ("patch", "straight")  # columns of the file of coloured slats, before those of its wavelengths
+
+
+def write_slat_light(light: SlatLight, path: Path) -> None:
+    """A CSV file of coloured slats: a row for each patch of incidence, a column for each ten nanometres."""
+    some = np.arange(0, len(NANOMETRES), SLAT_STEP)
+    patches = np.arange(1, KLEMS_FULL.size + 1)
+    head = [*SLAT_NAMES, *(f"{nm:g}" for nm in NANOMETRES[some])]
+    rows = np.column_stack([patches, light.straight, light.whole[:, some]])
+    lines = [",".join(head), *(",".join(f"{value:.5g}" for value in row) for row in rows)]
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def read_slat_light(path: Path) -> SlatLight:
+    """The transmittance of coloured slats of a file that `write_slat_light` wrote.
+
+    Raises: `DataError` for a file that is no such table.
+    """
+    wanted = [f"{nm:g}" for nm in NANOMETRES[::SLAT_STEP]]
+    columns = csv_columns(path, (*SLAT_NAMES, *wanted))
+    if not np.array_equal(columns["patch"], np.arange(1, KLEMS_FULL.size + 1)):
+        raise DataError(f"expected a row for each of {KLEMS_FULL.size} patches", file=path, field="patch")
+    values = np.array([columns[name] for name in wanted]).T
+    if min(values.min(), columns["straight"].min()) < 0 or values.max() > 1:
+        raise DataError("expected transmittances from 0 to 1", file=path)
+    whole = np.array([np.interp(NANOMETRES, NANOMETRES[::SLAT_STEP], row) for row in values])
+    return SlatLight(columns["straight"], whole)
+
+
+def read_reflectance(path: Path) -> NDArray[np.float64]:
+    """Reflectance at `NANOMETRES` of a CSV file of `REFLECTANCE_COLUMNS`.
+
+    Raises: `DataError` for a file that cannot be read or does not span 380 to 780 nm.
+    """
+    columns = csv_columns(path, REFLECTANCE_COLUMNS)
+    nm, rho = (columns[name] for name in REFLECTANCE_COLUMNS)
+    if len(nm) < 2 or np.any(np.diff(nm) <= 0) or nm[0] > NANOMETRES[0] or nm[-1] < NANOMETRES[-1]:
+        raise DataError("expected rising wavelengths from 380 to 780 nm", file=path)
+    if rho.min() < 0 or rho.max() > 1 or not rho.any():
+        raise DataError("expected reflectances from 0 to 1, not all 0", file=path, field="reflectance")
+    return np.interp(NANOMETRES, nm, rho)
+
+
+def reflectance_of_code(code: str) -> NDArray[np.float64]:
+    """Smooth reflectance at `NANOMETRES` of a colour "#rrggbb" (sRGB); `ValueError` for another text."""
+    if not re.fullmatch("#[0-9a-fA-F]{6}", code):
+        raise ValueError(f"colour: expected #rrggbb, got {code!r}")
+    return reflectance_of_colour(linear_of_display([int(code[i : i + 2], 16) / 255 for i in (1, 3, 5)]))
 
 
 class WindowHeatTable(ClosureTable):
@@ -548,8 +613,7 @@ def files_beside(bsdf: Path) -> tuple[Path, ...]:
     named = [layer.pane for layer in table.layers if layer.pane is not None]
     named += () if table.angular is None else table.angular.files
     if table.spectral is not None:
-        named += table.spectral.panes
-        named += () if table.spectral.shade is None else (table.spectral.shade,)
+        named += table.spectral.files
     there = (path.parent / file for file in named)
     return path, *(file for file in there if file.is_file())
 

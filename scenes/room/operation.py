@@ -22,7 +22,7 @@ from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky.sun import is_up, sun_directions
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.systems import FenestrationSystem, read_system, system_of_panes
-from scenes.fenestration.thermal_file import StateTable
+from scenes.fenestration.thermal_file import StateTable, read_reflectance
 from scenes.fenestration.thermal_system import checked_system
 from scenes.fenestration.tilts import tilt_states
 from scenes.room.luminaires import placed_spectrum
@@ -30,7 +30,6 @@ from scenes.room.operation_tables import PARTS, GainsTable, OperationTables, Roo
 from scenes.room.options import RoomOptions
 from scenes.room.schedules import WEEK, ScheduleTable, scheduled_fields
 from scenes.room.shading_rules import WEATHER_RULES, ShadingRule
-from scenes.room.surface_spectra import read_reflectance
 from scenes.toml_file import TomlTable, read_table, validated
 from thermal.control import by_schedule, by_threshold
 from thermal.emitters import HeatedSlab, IdealLoads

@@ -36,7 +36,7 @@ from scenes.results import MELANOPIC_BY_DAY, DaylightResult, ExploredColour, Spe
 from scenes.room.inputs import EYE_TURNS, RoomInputs
 from scenes.room.light import RoomLight, turned_eyes
 from scenes.room.luminaires import lamp_spectra
-from scenes.room.surface_spectra import room_reflectance
+from scenes.room.surface_spectra import ground_reflectance, room_reflectance
 from scenes.room.zone import lamp_lux
 
 MELANOPIC = DETECTORS.index("melanopic")
@@ -107,6 +107,7 @@ def _light(
         reflectance=reflectance,
         water_cm=_water(room.weather)[room.skies.lit],
         clear=room.options.sky_spectrum,
+        ground=ground_reflectance(tables),
         progress=progress,
     )
     return spectral, [*notes, *of_surfaces]
@@ -316,13 +317,13 @@ def explored_colour(
         Detection(channels.detection, slice(-1, None)),
     )
     water = _water(room.weather)[room.skies.lit]
-    skies = sky_spectra(room.skies, water, room.options.sky_spectrum)
+    tables = () if room.operation is None else room.operation.surface
+    skies = sky_spectra(room.skies, water, room.options.sky_spectrum, ground=ground_reflectance(tables))
     beam = room.skies.illuminance * np.maximum(room.skies.direction[:, 2], 0.0)
     white = detected(skies.horizontal)
     of_sky = detected(np.maximum(skies.horizontal - beam[:, None] * skies.sun, 0.0))
     factors, _ = _factors(room, light)
     left_out = frozenset() if light.inner is None else light.inner.faces
-    tables = () if room.operation is None else room.operation.surface
     reflectance, _ = room_reflectance(room.space, tables, left_out)
     seen = _seen_surfaces(light, pictures[0])
     pixels, indoors, suns, plane = [], [], [], []

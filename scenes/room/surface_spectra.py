@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from fnmatch import fnmatch
 from pathlib import Path
@@ -12,32 +11,31 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from bim.colours import GREY, linear_of_display
+from bim.colours import GREY
 from bim.model import FACE_KINDS, Element, Face, Space
 from mitsuba_cfs.bsdf.colour import reflectance_of_colour, with_visible
-from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.spectra.detectors import NANOMETRES
-from scenes.fenestration.thermal_file import csv_columns
+from scenes.fenestration.thermal_file import read_reflectance, reflectance_of_code
 from scenes.toml_file import TomlTable
 
-COLUMNS = ("wavelength_nm", "reflectance")
 FloatArray = NDArray[np.float64]
+GROUND = "ground"  # outdoors, as a table selects it
 
 
 class SurfaceTable(TomlTable):
     """The colour of some surfaces; their visible reflectance stays that of the building."""
 
-    select: Annotated[str, Field(min_length=1)]  # kind of a face, or its name, with * and ?
-    spectrum: Path | None = None  # CSV file of `COLUMNS`; its shape counts
+    select: Annotated[str, Field(min_length=1)]  # kind of a face, or its name, with * and ?; or `GROUND`
+    spectrum: Path | None = None  # CSV file of `REFLECTANCE_COLUMNS`; its shape counts
     colour: str | None = None  # "#rrggbb", sRGB
 
     @model_validator(mode="after")
     def _has_one(self) -> SurfaceTable:
         if (self.spectrum is None) == (self.colour is None):
             raise ValueError("expected spectrum or colour")
-        if self.colour is not None and not re.fullmatch("#[0-9a-fA-F]{6}", self.colour):
-            raise ValueError(f"colour: expected #rrggbb, got {self.colour!r}")
+        if self.colour is not None:
+            reflectance_of_code(self.colour)
         return self
 
     def selects(self, part: Face | Element) -> bool:
@@ -50,22 +48,12 @@ class SurfaceTable(TomlTable):
         """Reflectance [N] of any scale; `DataError` for a file that cannot be read."""
         if self.spectrum is not None:
             return read_reflectance(self.spectrum)
-        code = str(self.colour)
-        return reflectance_of_colour(linear_of_display([int(code[i : i + 2], 16) / 255 for i in (1, 3, 5)]))
+        return reflectance_of_code(str(self.colour))
 
 
-def read_reflectance(path: Path) -> FloatArray:
-    """Reflectance at `NANOMETRES` of a CSV file of `COLUMNS`.
-
-    Raises: `DataError` for a file that cannot be read or does not span 380 to 780 nm.
-    """
-    columns = csv_columns(path, COLUMNS)
-    nm, rho = (columns[name] for name in COLUMNS)
-    if len(nm) < 2 or np.any(np.diff(nm) <= 0) or nm[0] > NANOMETRES[0] or nm[-1] < NANOMETRES[-1]:
-        raise DataError("expected rising wavelengths from 380 to 780 nm", file=path)
-    if rho.min() < 0 or rho.max() > 1 or not rho.any():
-        raise DataError("expected reflectances from 0 to 1, not all 0", file=path, field="reflectance")
-    return np.interp(NANOMETRES, nm, rho)
+def ground_reflectance(tables: Sequence[SurfaceTable]) -> FloatArray | None:
+    """Reflectance of the ground outdoors [N], of any scale; None: neutral."""
+    return next((table.shape() for table in tables if table.select == GROUND), None)
 
 
 def room_reflectance(
@@ -76,6 +64,7 @@ def room_reflectance(
     Args: tables: the first that selects a surface counts; left_out: names of faces that are not there.
     """
     parts: list[Face | Element] = [*(face for face in space.faces if face.name not in left_out), *space.furniture]
+    tables = [table for table in tables if table.select != GROUND]
     visible = np.array([part.reflectance("visible") for part in parts])
     spectra, coloured, used = np.ones((len(parts), len(NANOMETRES))), 0, [False] * len(tables)
     shapes = [table.shape() for table in tables]

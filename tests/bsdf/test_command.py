@@ -16,7 +16,9 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_QUARTER, KlemsBsdf
 from mitsuba_cfs.bsdf.periodic import plastic, write_radiance
 from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.spectra.detectors import NANOMETRES, visible_mean
 from scenes.commands.bsdf import command
+from scenes.fenestration.thermal_file import SpectralTable
 from tests.conftest import OWN_BLIND
 
 POLYGON = " a polygon p 0 0 9 0 0 0 1 0 0 0 1 0"
@@ -183,6 +185,47 @@ def test_generate_writes_a_file_that_reads(variant, tmp_path):
     )
     assert (visible > solar).all()
     assert file.thickness == pytest.approx(0.08 * np.cos(np.radians(30)))
+
+
+def test_coloured_slats_pass_in_each_band_what_slats_of_that_reflectance_pass(variant, tmp_path):
+    options = "--depth-mm 80 --spacing-mm 72 --tilt-deg 45 --paths 1024".split()
+    (tmp_path / "paint.csv").write_text("wavelength_nm,reflectance\n380,0.1\n560,0.1\n620,0.7\n780,0.7\n")
+    out = tmp_path / "red.xml"
+    text = run("generate", *options, "--spectrum", tmp_path / "paint.csv", "--out", out).output
+    assert 'slats = "red_slats.csv"' in text
+    slats = SpectralTable(slats=tmp_path / "red_slats.csv").factor().slats
+    area, grey = KLEMS_FULL.projected_solid_angles(), tmp_path / "grey.xml"
+    for nm, reflectance in ((450, 0.1), (700, 0.7)):
+        run("generate", *options, "--visible", reflectance, "--out", grey)
+        passed = area @ read_bsdf_xml(grey).band("Visible").transmission_front
+        # the same paths: rounding of the file, and the polynomial
+        np.testing.assert_allclose(slats.whole[:, nm - 380], passed, rtol=2e-3, atol=1e-3)
+    # all of them in visible light: more than at the mean reflectance, as light that is reflected twice
+    passed = area @ read_bsdf_xml(out).band("Visible").transmission_front
+    assert visible_mean(slats.whole) == pytest.approx(passed, rel=5e-3, abs=1e-3)
+    visible = float(visible_mean(np.interp(NANOMETRES, [560, 620], [0.1, 0.7])))
+    run("generate", *options, "--visible", visible, "--out", grey)
+    at_mean = area @ read_bsdf_xml(grey).band("Visible").transmission_front
+    assert 1.01 < passed.mean() / at_mean.mean() < 1.03
+    assert (slats.straight <= slats.whole.min(axis=1)).all() and slats.straight.max() > 0.3
+
+
+@pytest.mark.parametrize(
+    "options, message",
+    [
+        ("--colour red", "expected #rrggbb"),
+        ("--colour #aa3311 --basis quarter", "need --shape"),
+        ("--colour #aa3311 --tensor-tree 3", "need --shape"),
+        ("--colour #aa3311 --shape prism", "need --shape"),
+        ("--colour #aa3311 --spectrum paint.csv", "exclude each other"),
+    ],
+)
+def test_colours_that_cannot_be_are_refused(tmp_path, monkeypatch, options, message):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "paint.csv").write_text("wavelength_nm,reflectance\n380,0.1\n780,0.7\n")
+    answer = run("generate", *"--depth-mm 80 --spacing-mm 72".split(), *options.split(), "--out", "x.xml")
+    assert answer.exit_code == 2 and message in answer.output
+    assert not (tmp_path / "x.xml").exists()
 
 
 @pytest.mark.parametrize(

@@ -145,7 +145,7 @@ def _generated_file(**_options):
     from mitsuba_cfs.bsdf.xml import read_bsdf_xml
     from scenes.demo import VENETIAN_BLIND
 
-    return read_bsdf_xml(VENETIAN_BLIND), "made up"
+    return read_bsdf_xml(VENETIAN_BLIND), "made up", None
 
 
 def _case(case, *, progress=None):

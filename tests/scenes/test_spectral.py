@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from bim.shoebox import shoebox
-from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
+from mitsuba_cfs.bsdf.spectral_factor import SlatLight, SpectralFactor
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.methods.light import eye_illuminance, illuminance
 from mitsuba_cfs.spectra.channels import channels_of
@@ -20,7 +20,7 @@ from mitsuba_cfs.spectra.detectors import NANOMETRES, colour_temperature, daylig
 from scenes.cli import cfs
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import FenestrationSystem, read_system
-from scenes.fenestration.thermal_file import SpectralTable, StateTable, read_spectrum
+from scenes.fenestration.thermal_file import SpectralTable, StateTable, read_spectrum, write_slat_light
 from scenes.fenestration.tilts import tilt_states
 from scenes.input_files import read_weather
 from scenes.report.spectral_figures import melanopic_against_glare
@@ -30,7 +30,7 @@ from scenes.room.operation import read_operation, read_state
 from scenes.room.options import RoomOptions
 from scenes.room.room import inputs_of_room
 from scenes.room.spectral import _factors, room_spectral
-from scenes.room.surface_spectra import SurfaceTable, room_reflectance
+from scenes.room.surface_spectra import SurfaceTable, ground_reflectance, room_reflectance
 from scenes.room.windows import in_all_windows
 from tests.scenes.test_tilts import family
 
@@ -107,7 +107,7 @@ def test_run_writes_tables_and_names_systems_without_a_spectrum(tmp_path) -> Non
 def test_spectrum_of_panes_and_shade(blind) -> None:
     factor = read_system(blind).spectrum
     assert isinstance(factor, SpectralFactor)
-    blue, _, red = factor.of_patches(channels_of(3))[:, 0]
+    blue, _, red = factor.of_patches(channels_of(3)).whole[:, 0]
     assert blue == 0 and red > 1
     assert read_system(VENETIAN_BLIND).spectrum is None
 
@@ -127,6 +127,27 @@ def test_faults_of_a_spectrum(tmp_path, text: str, message: str) -> None:
     path.write_text(text, "utf-8")
     with pytest.raises(DataError, match=message):
         read_spectrum(path)
+
+
+def test_a_file_of_coloured_slats_is_read_as_it_was_written_and_faults_are_named(tmp_path) -> None:
+    straight = np.linspace(0.0, 0.4, 145)
+    light = SlatLight(straight, straight[:, None] + np.interp(NANOMETRES, [380, 780], [0.1, 0.5]))
+    path = tmp_path / "slats.csv"
+    write_slat_light(light, path)
+    found = SpectralTable(slats=path).factor()
+    assert found.slats.whole == pytest.approx(light.whole, abs=1e-4)
+    assert found.slats.straight == pytest.approx(straight, abs=1e-5) and found.mirrored is None
+    rows = path.read_text("utf-8").splitlines()
+    for lines, message in (
+        (rows[:-1], "a row for each of 145 patches"),
+        ([rows[0].replace("380", "381"), *rows[1:]], "expected the columns patch, straight, 380"),
+        ([rows[0], rows[1].replace("1,0,", "1,-0.1,", 1), *rows[2:]], "from 0 to 1"),
+    ):
+        path.write_text("\n".join(lines), "utf-8")
+        with pytest.raises(DataError, match=message):
+            SpectralTable(slats=path).factor()
+    with pytest.raises(ValueError, match="expected shade or slats, got both"):
+        SpectralTable(slats=path, shade=path)
 
 
 def test_path_tracing_has_no_spectrum() -> None:
@@ -237,6 +258,9 @@ def test_colours_of_surfaces_are_those_stated_then_those_of_the_model(tmp_path) 
     assert room_reflectance(shoebox().spaces[0]) == (None, [])
     other = room_reflectance(shoebox().spaces[0], (*tables[1:], SurfaceTable(select="no such", colour="#ff0000")))
     assert [note for note in other[1] if "no such" in note]
+    lawn = SurfaceTable(select="ground", colour="#407030")
+    assert room_reflectance(shoebox().spaces[0], (lawn,)) == (None, [])  # outdoors
+    assert ground_reflectance((*tables, lawn)) == pytest.approx(lawn.shape()) and ground_reflectance(tables) is None
 
 
 @pytest.mark.parametrize(

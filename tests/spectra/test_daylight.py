@@ -14,7 +14,7 @@ from mitsuba_cfs.spectra.daylight import (
     sun_spectra,
     water_vapour_cm,
 )
-from mitsuba_cfs.spectra.detectors import colour_temperature, detected, illuminant
+from mitsuba_cfs.spectra.detectors import NANOMETRES, colour_temperature, detected, illuminant
 
 
 def test_daylight_is_that_of_the_standard_illuminants() -> None:
@@ -57,3 +57,16 @@ def test_photopic_sky_is_the_luminance_of_its_patches() -> None:
     # the ground has the colour of the whole: between the sun's and the sky's
     of = [colour_temperature(detected(s)[..., -3:])[0] for s in (sky.sun[0], sky.ground[0])]
     assert of[0] < of[1] < 6514
+
+
+def test_coloured_ground_keeps_its_luminance_and_turns_the_daylight_on_it() -> None:
+    weights, luminance = np.array([0.0, np.pi]), np.full((2, 3), 1000.0)
+    beam, height = np.array([0.0, 50_000.0, 0.0]), np.array([0.3, 0.6, 0.1])
+    luminance[1, 2] = 0.0  # dark
+    green = np.interp(NANOMETRES, [500.0, 550.0, 600.0], [0.05, 0.2, 0.05])
+    neutral, lawn = (spectral_sky(luminance, weights, beam, height, ground=g) for g in (None, green))
+    np.testing.assert_array_equal(neutral.ground_luminance, lawn.ground_luminance)
+    assert detected(lawn.ground)[:, 0] == pytest.approx(1.0)  # per lumen
+    shape = lawn.ground[:2] / neutral.ground[:2] / green
+    assert shape == pytest.approx(np.broadcast_to(shape[:, :1], shape.shape))
+    np.testing.assert_array_equal(lawn.horizontal, neutral.horizontal)

@@ -207,11 +207,10 @@ def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
     share = room_shares(cells, inside, (places, normals), samples=256)
     sun = towards(40, 20)[None]
     way = BsdfOptics(clear_glass()).scattering
-    suns = sun, np.array([LUX])
-    [lux] = room_light(cells[0], [share], Beam((inside, outside), 0, way), suns)
+    [lux] = room_light([share], Beam((inside, outside), 0, way).flux(cells[0], sun), np.array([LUX]))
     flux = 0.8 * LUX * -sun[0, 1] * 1.0
     wall = TracedScene(rooms.surfaces([(9 * square(1, 0.0) - 12, 0.0)]), [group])
-    [hidden] = room_light(cells[0], [share], Beam((inside, wall), 0, way), suns)
+    [hidden] = room_light([share], Beam((inside, wall), 0, way).flux(cells[0], sun), np.array([LUX]))
     assert np.all(hidden == 0)
     # light that the black hole of 1 m2 in 54 takes: twice, as it hides the wall behind it
     assert lux.mean() == pytest.approx(0.6 / (1 - 0.6 * (1 - 1 / 54)) * flux / 54, rel=0.03)
@@ -228,7 +227,8 @@ def test_few_rays_of_a_sensor_ask_for_few_from_the_cells_with_the_same_light():
     for samples, rays in ((128, CELL_LEAST), (32 * CELL_RAYS, CELL_RAYS)):
         cells = room_cells(inside, samples=samples)
         assert cells[1].rays == rays and cells[1].starts.size == rays * cells[1].cells.size
-        found.append(room_shares(cells, inside, sensors, samples=4096) @ cells[0].area)
+        share = room_shares(cells, inside, sensors, samples=4096)
+        found.append(share @ cells[0].area)
     np.testing.assert_allclose(*found, rtol=0.005)
 
 
@@ -282,9 +282,8 @@ def test_a_sensor_close_to_a_sunlit_wall_has_the_part_of_it_above_its_horizon():
     for seed in range(3):
         sensor = place[None], np.array([[0.0, 0.0, 1.0]])
         share = room_shares(cells, inside, sensor, samples=65_536, seed=seed)
-        suns = sun[None], np.array([LUX])
-        of_seed = Beam((inside, outside), 0, beam, seeds=(seed,))
-        found.append(room_light(cells[0], [share], of_seed, suns)[0][0, 0])
+        flux = Beam((inside, outside), 0, beam, seeds=(seed,)).flux(cells[0], sun[None])
+        found.append(room_light([share], flux, np.array([LUX]))[0][0, 0])
     assert np.mean(found) == pytest.approx(expected, rel=0.08)  # 0.05, and 0.02 of noise
 
 

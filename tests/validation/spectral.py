@@ -1,9 +1,10 @@
-"""Light by wavelength against Radiance: melanopic EDI, DER and CCT behind several windows, in two rooms."""
+"""Light by wavelength against Radiance: melanopic EDI, DER and CCT behind several windows, in three rooms."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -48,12 +49,17 @@ SKY_AND_GROUND = (
 ALTITUDE, AZIMUTH = 35.0, 170.0  # of the sun [degrees], from north by east
 BANDS = 20  # of each run of the peer, whose build has at most 24
 RANGES = 4  # of 100 nm each, a run of the peer for each
+GAP = 1e-4  # between panes [m]: what leaves a wider one past its rim has met the inner panes alone
 # Diffuse reflectances of the room's faces that are not neutral
 ROOMS: dict[str, dict[str, NDArray[np.float64]]] = {
     "neutral": {},
     "red wall, wooden floor": {
         "left": np.interp(NANOMETRES, [570.0, 620.0], [0.05, 0.7]),
         "floor": np.interp(NANOMETRES, [380.0, 780.0], [0.08, 0.5]),
+    },
+    "yellow walls, blue carpet": {
+        **dict.fromkeys(("left", "right"), np.interp(NANOMETRES, [450.0, 530.0], [0.1, 0.75])),
+        "floor": np.interp(NANOMETRES, [380.0, 460.0, 520.0, 640.0, 780.0], [0.08, 0.18, 0.1, 0.04, 0.25]),
     },
 }
 POINTS = np.array([[2.0, 3.0, 0.8], [2.0, 3.0, 1.2], [2.0, 3.0, 1.2]])
@@ -175,22 +181,13 @@ def photopic_light(window: Window, sky: AnnualSky, scene: DaylightScene) -> Phas
 
 def radiances(window: Window, kind: str, bounces: int, divisions: int, room: str) -> Light:
     """Radiance's: spectra as its own primitives, each pane a `glass`, the fabric a `trans`."""
-    scene, reflectance = room_scene(room)
     power = []  # in the bands of the ranges, from blue to red
     with TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "room.rad").write_text(_surfaces(scene.interior, reflectance), "utf-8")
-        (folder / "pane.cal").write_text(PANE_CAL, "utf-8")
-        azimuth = AZIMUTH - 180.0  # gendaylit's: west of south
-        beam, diffuse = (0.0, 200.0) if kind == "overcast" else (800.0, 50.0)
-        made = run(f"gendaylit -ang {ALTITUDE} {azimuth} -W {beam} {diffuse}", folder).decode()
-        (folder / "sky.rad").write_text(_sky(made, kind, window.panes), "utf-8")
         lines = "".join(" ".join(f"{v:g}" for v in (*p, *n)) + "\n" for p, n in zip(POINTS, NORMALS, strict=True))
         options = f"-I+ -h -ab {bounces} -aa 0 -ad {divisions} -as 0 -lw 1e-7 -dj 0 -dc 1 -dt 0 -cs {BANDS} -co+"
-        for low in np.linspace(380.0, 780.0, RANGES, endpoint=False):
-            high = low + 400.0 / RANGES
-            (folder / "glass.rad").write_text(_glass(scene, window, low, high), "utf-8")
-            run("oconv sky.rad room.rad glass.rad > scene.oct", folder)
+        for low, high in ranges():
+            peer_scene(folder, window, kind, room, (low, high))
             command = f"rtrace {options} -cw {low:g} {high:g} scene.oct"
             text = run(command, folder, lines.encode()).decode()
             values = np.array([[float(v) for v in line.split()] for line in text.splitlines()])
@@ -200,6 +197,25 @@ def radiances(window: Window, kind: str, bounces: int, divisions: int, room: str
     # a spectrum of 1 has 179 lm/W in Radiance
     flat = detected(np.ones(len(NANOMETRES)))[0]
     return Light.of(np.concatenate(power, axis=1) @ EVERY_5_NM.detection.T * 179.0 / flat)
+
+
+def ranges() -> list[tuple[float, float]]:
+    """Ends of the peer's ranges of wavelength [nm]."""
+    ends = np.linspace(380.0, 780.0, RANGES + 1).tolist()
+    return list(pairwise(ends))
+
+
+def peer_scene(folder: Path, window: Window, kind: str, room: str, nm: tuple[float, float], gap: float = GAP) -> None:
+    """Write sky.rad, room.rad, glass.rad and their scene.oct for a range of wavelengths; gap: between panes [m]."""
+    scene, reflectance = room_scene(room)
+    (folder / "room.rad").write_text(_surfaces(scene.interior, reflectance), "utf-8")
+    (folder / "pane.cal").write_text(PANE_CAL, "utf-8")
+    azimuth = AZIMUTH - 180.0  # gendaylit's: west of south
+    beam, diffuse = (0.0, 200.0) if kind == "overcast" else (800.0, 50.0)
+    made = run(f"gendaylit -ang {ALTITUDE} {azimuth} -W {beam} {diffuse}", folder).decode()
+    (folder / "sky.rad").write_text(_sky(made, kind, window.panes), "utf-8")
+    (folder / "glass.rad").write_text(_glass(scene, window, *nm, gap), "utf-8")
+    run("oconv sky.rad room.rad glass.rad > scene.oct", folder)
 
 
 def _surfaces(surfaces: Surfaces, reflectance: NDArray[np.float64]) -> str:
@@ -273,8 +289,8 @@ coated(nm) = at((nm - 380)/5) * if(shape, shape, 0) / both(arg(3));
 """
 
 
-def _glass(scene: DaylightScene, window: Window, low: float, high: float) -> str:
-    """Panes as `glass`, a centimetre apart; what is innermost is in the window's plane.
+def _glass(scene: DaylightScene, window: Window, low: float, high: float, gap: float) -> str:
+    """Panes as `glass`, a gap apart; what is innermost is in the window's plane.
 
     Radiance evaluates a `specfunc` at few wavelengths of its range, so that it has that of the run
     [nm].
@@ -304,6 +320,6 @@ def _glass(scene: DaylightScene, window: Window, low: float, high: float) -> str
         for group in scene.groups:
             for each in group.windows:
                 for k, triangle in enumerate(each.triangles):
-                    moved = triangle + 0.01 * i * group.frame[2]
+                    moved = triangle + gap * i * group.frame[2]
                     parts.append(polygon(f"layer{i}", f"sheet{i}_{k}", moved))
     return "\n".join(parts)

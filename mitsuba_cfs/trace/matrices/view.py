@@ -537,6 +537,7 @@ def views_of_rooms(
     rooms: Sequence[TracedRoom],
     *,
     with_direct: bool = False,
+    direct: NDArray[np.float64] | None = None,
     by_groups: Sequence[SurfaceGroups] = (),
     basis: KlemsBasis = KLEMS_FULL,
     samples: int = 4096,
@@ -554,6 +555,7 @@ def views_of_rooms(
 
     Args:
         with_direct: the matrices with a depth of 1 besides, entry by entry a part of the others.
+        direct: those [S, G, K] of a single room, where they are known: they are not traced again.
         by_groups: of the surfaces of each room, as many in each: derivatives by their reflectances, from
             the same paths; none by default.
     """
@@ -587,7 +589,7 @@ def views_of_rooms(
     def traced(some: Sequence[int]) -> Callable[[int], NDArray[np.float64]]:
         placed, tracer = scenes.together([rooms[i] for i in some])
         of = _Sensors.of(tracer, bins, placed, [by_groups[i] for i in some] if by_groups else ())
-        return _batches(of, n, depths, seed)
+        return _batches(of, n, depths, seed, direct)
 
     estimates = of_rooms(
         rooms,
@@ -600,15 +602,17 @@ def views_of_rooms(
         layers=len(layers),
     )
     of_layers = [estimates[i : i + len(rooms)] for i in range(0, len(estimates), len(rooms))]
-    whole, direct = of_layers[0], of_layers[1] if with_direct else [None] * len(rooms)
+    whole, apart = of_layers[0], of_layers[1] if with_direct else [None] * len(rooms)
     by_reflectance = zip(*of_layers[len(depths) :], strict=True) if groups else [()] * len(rooms)
-    return [RoomViews(*views) for views in zip(whole, direct, map(tuple, by_reflectance), strict=True)]
+    return [RoomViews(*views) for views in zip(whole, apart, map(tuple, by_reflectance), strict=True)]
 
 
-def _batches(of: _Sensors, samples: int, depths: Sequence[int], seed: int) -> Callable[[int], NDArray[np.float64]]:
+def _batches(
+    of: _Sensors, samples: int, depths: Sequence[int], seed: int, known: NDArray[np.float64] | None
+) -> Callable[[int], NDArray[np.float64]]:
     """Batches of the rows of all rooms [S * G of each, K], those of each depth.
 
-    Args: depths: most bounces; a second one is 1.
+    Args: depths: most bounces; a second one is 1.  known: those of a depth of 1, which are not traced.
     """
     max_depth = depths[0]
     most = int(of.counts.max())
@@ -620,11 +624,14 @@ def _batches(of: _Sensors, samples: int, depths: Sequence[int], seed: int) -> Ca
         size = int(of.entries[-1])
         matrix = empty_sums(of.layers * size)
         key = batch_key(seed, number)
-        _add_direct(of, matrix, samples=samples, key=key)
+        if known is None:
+            _add_direct(of, matrix, samples=samples, key=key)
         direct = [] if len(depths) == 1 else [np.array(sums_of(matrix, (size,)))]
         if of.tracer.gloss is not None and max_depth > 1:
             _add_mirrored(of, matrix, samples=samples, max_depth=max_depth, key=key)
-        values = sums_of(matrix, (of.layers, size))
+        values = np.array(sums_of(matrix, (of.layers, size)))
+        if known is not None:
+            values[0] += known.ravel()
         for launch in _launches(of, blocks) if blocks else ():
             added = indirect_rows(of, launch, max_depth=max_depth, key=key)
             for block, rows in zip(launch, added, strict=True):

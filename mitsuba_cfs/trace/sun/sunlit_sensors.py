@@ -27,7 +27,7 @@ from mitsuba_cfs.surfaces import SurfaceGroups
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, tables
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_faces
-from mitsuba_cfs.trace.sun.sunlit_cells import RAYS, Beam, RoomCells, surface_cells
+from mitsuba_cfs.trace.sun.sunlit_cells import RAYS, RoomCells, surface_cells
 
 CELL_RAYS = 128  # from each cell, in each batch, at most
 CELL_LEAST = 32  # and at the least: fewer take as long
@@ -163,20 +163,17 @@ def _between(
 
 
 def room_light(
-    cells: RoomCells,
-    shares: Sequence[NDArray[np.float64]],
-    beam: Beam,
-    suns: tuple[NDArray[np.float64], NDArray[np.float64]],
+    shares: Sequence[NDArray[np.float64]], flux: sparse.csr_array, strength: NDArray[np.float64]
 ) -> list[NDArray[np.float64]]:
     """Illuminance of sensors by what the room reflects of a group's straight beam [B][S, h].
 
     Args:
         shares: [B][S, c] of `room_shares`, one for each seed of the beam.
-        suns: [h, 3] directions, and [h] illuminance normal to them.
+        flux: [c, B * h] of the `Beam`.
+        strength: [h] illuminance normal to the sun.
     """
-    (towards, strength), count = suns, len(suns[0])
-    flux = beam.flux(cells, towards)
-    parts = (flux[:, b * count : (b + 1) * count] for b in range(len(beam.seeds)))
+    count = len(strength)
+    parts = (flux[:, b * count : (b + 1) * count] for b in range(len(shares)))
     return [(share @ part) * strength for share, part in zip(shares, parts, strict=True)]
 
 
