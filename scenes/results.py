@@ -299,6 +299,14 @@ class ExploredRoom:
     colour: ExploredColour | None = None  # of runs by wavelength
 
 
+@dataclass(frozen=True, slots=True)
+class Bands:
+    """Bands of a room's figures, and how likely it meets rules."""
+
+    figures: pd.DataFrame  # figure, unit, value, p5, median, p95, decided_by, decided_percent
+    verdicts: pd.DataFrame  # rule, met, met_percent, decided_by, decided_percent
+
+
 @dataclass(frozen=True, slots=True, repr=False)
 class RoomYear:
     """The year of one room: its daylight, glare, heat and operation."""
@@ -313,6 +321,7 @@ class RoomYear:
     spectral: SpectralYear | None = None  # of `spectral`
     # of `sensitivities`, a row for each input and figure, see `scenes.room.sensitivities`
     sensitivities: pd.DataFrame | None = None
+    bands: Bands | None = None  # of `bands`
     dgp: AnnualGlare | None = None  # [n] by the metric and in the hours of `rate`
     dgp_sunny_hour_error: float = 0.0  # of three-phase `dgp`
     as_lobe: dict[str, float] = field(default_factory=dict)  # of `scenes.room.lobes`

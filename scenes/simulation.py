@@ -25,12 +25,13 @@ from scenes.result_folder import ResultFolder
 from scenes.results import RoomYear, RunResult
 from scenes.room.operation import Controller, Operation, read_operation
 from scenes.room.options import RoomOptions
-from scenes.run.netcdf import year_dataset
+from scenes.run.netcdf import attributes, year_dataset
 from scenes.run.options import JobOptions
 from scenes.run.outputs import write_results
 from scenes.run.run import run_inputs
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.axes import Axes
     from xarray import Dataset
 
@@ -41,6 +42,13 @@ class SimulatedYear(RoomYear):
 
     run: RunResult  # that it is the one room of; without it
     head: Head = NO_HEAD  # what was left out of the model, what was assumed
+
+    @property
+    def hours(self) -> pd.DataFrame:
+        """Every hour [H], as of `RoomYear`; `hours.attrs["units"]` has the unit of each column."""
+        hours = super(SimulatedYear, self).hours
+        hours.attrs["units"] = {name: attributes(name)["units"] for name in hours.columns}
+        return hours
 
     def write(self, folder: str | PathLike[str], *, report: bool = True, netcdf: bool = False) -> None:
         """Write the files of `cfs run` in the place of its earlier ones.

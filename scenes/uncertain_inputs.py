@@ -30,6 +30,8 @@ INPUTS = {
         UncertainInput("reflectance_furniture", N_("reflectance of the furniture"), "", 0.14),
         UncertainInput("reflectance_ground", N_("reflectance of the ground"), "", 0.05),
         UncertainInput("transmittance_percent", N_("light through the windows"), "%", 5.0),
+        UncertainInput("sky_percent", N_("light of the sky and the sun"), "%", 5.0),
+        UncertainInput("tracing", N_("noise of tracing"), "", 1.0),
         UncertainInput("tilt_deg", N_("tilt of the slats"), "deg", 3.0),
         UncertainInput("g_value", N_("g-value of the windows"), "", 0.018),
         UncertainInput("u_value", N_("U-value of the windows"), "W/(m2 K)", 0.18),

@@ -35,7 +35,7 @@ NO_EVIDENCE = {
         "| option | what |",
         "| rule | quantity | set-up | weather that it asks for |",
     },
-    "sensitivities.md": {"| column | content |", "| input | deviation | source |"},
+    "sensitivities.md": {"| column | content |", "| file | content |", "| input | deviation | source |"},
     "spectral.md": {"| file | content |", "| part | spectrum |"},
     "app.md": {"| file | content | read by |"},
     "studies.md": {"| in the folder | what |", "| event | what is done |"},

@@ -131,13 +131,15 @@ def cie_glare_index(contrast: float, illuminance: float, direct: float) -> float
 def discomfort_glare_rating(luminance: ArrayLike, omega: ArrayLike, position: ArrayLike, field: float) -> float:
     """DGR = (sum 0.5 L Q/(P F^0.44))^(n^-0.0914), Q = 20.4 omega + 1.52 omega^0.2 - 0.075.
 
-    F is the average luminance of the field of view. Source: IES RQQ (1966).
+    F is the average luminance of the field of view. Q is negative below 2.9e-7 sr: where such
+    sources outweigh the others there is no glare. Source: IES RQQ (1966).
     """
     L, w, P = (np.asarray(a, dtype=float) for a in (luminance, omega, position))
     if L.size == 0:
         return 0.0
     Q = 20.4 * w + 1.52 * w**0.2 - 0.075
-    return float(np.sum(0.5 * L * Q / (P * field**0.44)) ** (L.size**-0.0914))
+    total = float(np.sum(0.5 * L * Q / (P * field**0.44)))
+    return max(total, 0.0) ** (L.size**-0.0914)
 
 
 def visual_comfort_probability(rating: float) -> float:

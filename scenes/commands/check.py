@@ -98,7 +98,9 @@ def command(
     known = known_fenestration(spaces, options.building)
     # a file or a program that reads on gets every line whole, however long
     console = Console(width=None if Console().is_terminal else UNCUT)
-    head = head_of(read, light_only=True).with_assumptions(known.notes("a run needs --cfs"))
+    head = head_of(read, light_only=True).with_assumptions(
+        known.notes("a run needs a system for them: --cfs, or step 3 of cfs app")
+    )
     lines = (*head.model, *(f"assumed: {text}" for text in head.assumed))
     for line in lines:
         console.print(line, markup=False, highlight=False)

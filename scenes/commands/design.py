@@ -93,7 +93,7 @@ def _print_outcome(result: DesignResult, out: Path) -> None:
     for sentence in answer(result):
         click.echo(sentence)
     click.echo(
-        f"{len(result.searched)} candidates, {len(result.ranked)} in full; {result.cases} cases, {result.reused} were "
-        f"there, {result.seconds:.0f} s; table: {out / 'results.parquet'}"
+        f"{len(result.searched)} candidates, {len(result.ranked)} in full; {result.cases} cases, {result.reused} from "
+        f"an earlier run, {result.seconds:.0f} s; table: {out / 'results.parquet'}"
     )
     click.echo(f"report: {out / 'report.html'}")

@@ -11,6 +11,7 @@ EXAMPLES = {
         "cfs run house.ifc --weather city.epw --cfs blind.xml --u 1.1 --g 0.25 --out results",
         "cfs run house.ifc --weather city.epw --space Kitchen --annual-glare --out results",
         "cfs run house.ifc --weather city.epw --cfs blind.xml --sensitivities --out results",
+        "cfs run house.ifc --weather city.epw --cfs blind.xml --bands --out results",
     ),
     "comply": (
         "cfs comply --list",

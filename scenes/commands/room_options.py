@@ -284,6 +284,11 @@ sensitivities_option = click.option(
     is_flag=True,
     help="Derivatives of the results by reflectances, g, U, gains and others; see docs/sensitivities.md.",
 )
+bands_option = click.option(
+    "--bands",
+    is_flag=True,
+    help="Results as medians with 5 and 95 %, rules as probabilities, by the usual uncertainty of the inputs.",
+)
 channels_option = click.option(
     "--channels",
     type=click.Choice(list(map(str, CHANNEL_SETS))),

@@ -14,6 +14,7 @@ from scenes import quick as quick_run
 from scenes.commands.room_options import (
     FILE,
     PrintedHead,
+    bands_option,
     channels_option,
     chosen_language,
     explore_option,
@@ -44,6 +45,7 @@ NEED_PHASES = {
     "annual_glare": "--annual-glare",
     "spectral": "--spectral",
     "sensitivities": "--sensitivities",
+    "bands": "--bands",
     "explore": "--explore",
     "inner_glass": "--inner-glass",
     "error": "--error",
@@ -75,6 +77,7 @@ class Percentage(click.ParamType):
 @spectral_option
 @channels_option
 @sensitivities_option
+@bands_option
 @method_option(METHODS, "see docs/daylight.md", default=_DEFAULT.method)
 @u_option
 @click.option("--g", "g_value", type=click.FloatRange(0, 1), help="g-value at normal incidence.")

@@ -202,9 +202,8 @@ def _print_outcome(result: StudyResult, out: Path) -> None:
     from scenes.result_folder import EXPLORER
 
     click.echo(
-        f"{ngettext('{count} case', '{count} cases', len(result.results))}: {result.reused} were "
-        f"there, "
-        f"{result.failed} failed, {result.seconds:.0f} s; table: {out / 'results.parquet'}"
+        f"{ngettext('{count} case', '{count} cases', len(result.results))}: {result.reused} from "
+        f"an earlier run, {result.failed} failed, {result.seconds:.0f} s; table: {out / 'results.parquet'}"
     )
     if result.clock:
         click.echo(f"auto: {result.clock}")

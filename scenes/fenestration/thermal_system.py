@@ -111,12 +111,14 @@ def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     g_value = system.g_by_patch if by_patch else data.g_value
     fenestration = closure.close(Fenestration(system.name, data.u_value))
     absorptances = window.absorptances(tau, rho, g_value, fenestration, item=system.name)
-    model = closure.described(window.position, g_by_direction=by_patch)
+    position_notes = tuple(_position_note(system, window, scatters))
+    stated = not (data.assumptions or position_notes)
+    model = closure.described(window.position, g_by_direction=by_patch, stated=stated)
     layers = None if by_patch or system.from_values else window.typical
     optics = (tau, rho, incidence)
     likely = layers and likely_diffuse_g(window, optics, weight, sun_in_layers, system.name)
     extremes: tuple[GlazingUnit, ...] = ()
-    notes = [*map(_note, data.assumptions), *_position_note(system, window, scatters)]
+    notes = [*map(_note, data.assumptions), *position_notes]
     if layers is not None and likely is not None:
         used = float(weight @ data.g_value)
         notes.append(_typical_note(system.name, layers, used, likely))

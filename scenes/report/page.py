@@ -21,7 +21,7 @@ from mitsuba_cfs.files import json_text, write_text
 from scenes.figures.plan import plan_frame, window_from_above
 from scenes.head import Head
 from scenes.language.catalogue import N_, gettext, in_language, ngettext, translated
-from scenes.language.numbers import cell, day_and_month, rounded, semicolons
+from scenes.language.numbers import cell, colon, day_and_month, rounded, semicolons
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import tables
@@ -269,8 +269,14 @@ def environment(own: Mapping[str, str] | None = None) -> jinja2.Environment:
     environment.filters["script_json"] = script_json
     environment.filters["packed_json"] = packed_json
     environment.filters["tied"] = tied
+    environment.filters["headed"] = headed
     environment.install_gettext_callables(gettext, ngettext)
     return environment
+
+
+def headed(text: object) -> str:
+    """A heading with the page's colon after it."""
+    return colon(str(text), "").rstrip(" ")
 
 
 def tied(text: str) -> Markup:
@@ -423,10 +429,12 @@ def timings_table(result: RunResult) -> tables.Table:
 
 def remaining(manifest: Mapping) -> dict[str, Any]:
     """What the manifest holds besides the parts shown in tables of their own."""
-    tables_of_their_own = ("inputs", "options", "versions", "seconds", "rooms")
+    tables_of_their_own = ("inputs", "options", "seed", "versions", "seconds", "rooms", "folders")
     at_the_head = ("quick", "head", "fenestration", "building", "site", "system")
     shown = (*tables_of_their_own, *at_the_head)
-    return {key: value for key, value in manifest.items() if key not in shown and value not in ([], None)}
+    names = {"variant": gettext("Mitsuba variant"), "weather_notes": gettext("Notes on the weather")}
+    rest = {key: value for key, value in manifest.items() if key not in shown and value not in ([], None)}
+    return {names.get(key, key): value for key, value in rest.items()}
 
 
 def _named(manifest: Mapping, name: str) -> str:

@@ -1,4 +1,4 @@
-"""The inputs that matter most, in words: derivative times the input's usual uncertainty."""
+"""What inputs do to results, in words: those that matter most, bands, how likely rules are met."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pandas as pd
 
 from scenes.language.catalogue import N_, gettext
 from scenes.language.numbers import significant
-from scenes.results import RunResult
+from scenes.results import RoomYear, RunResult
 from scenes.uncertain_inputs import INPUTS
 
 NAMED = 3  # inputs
@@ -63,3 +63,60 @@ def _listed(figure: str, inputs: pd.DataFrame) -> str:
 def _with_unit(value: float, unit: str) -> str:
     shown = {"deg": "°", "": ""}.get(unit, f" {unit}")
     return f"{significant(value, 2)}{shown}"
+
+
+MOST_ROOMS = 3  # whose bands are written out
+RULE_WORDS = {
+    "lm83_accepted": N_("sDA of at least 55 % (LM-83)"),
+    "en17037_minimum": N_("daylight provision of EN 17037, level minimum"),
+    "en17037_glare": N_("DGP above 0.40 in at most 5 % of the occupied hours (EN 17037)"),
+}
+
+
+def bands_sentence(result: RunResult) -> str:
+    """Bands of daylight and heat, and how likely rules are met; "" without bands."""
+    rooms = [room for room in result.spaces if room.bands is not None]
+    sentences = [_bands_of(room) for room in rooms[:MOST_ROOMS]]
+    if len(rooms) > MOST_ROOMS:
+        sentences.append(gettext("The bands of the other rooms are in their bands.csv and bands_verdicts.csv."))
+    return " ".join(sentences)
+
+
+def _bands_of(room: RoomYear) -> str:
+    if room.bands is None:
+        return ""
+    figures = room.bands.figures.set_index("figure")
+    loads = [name for name in LOADS if name in figures.index]
+    heat = max(loads, key=lambda name: float(figures.loc[name, "value"])) if loads else "highest_operative_c"
+    parts = [
+        gettext(
+            BAND_WORDS[name],
+            low=significant(float(figures.loc[name, "p5"]), 3),
+            median=significant(float(figures.loc[name, "median"]), 3),
+            high=significant(float(figures.loc[name, "p95"]), 3),
+        )
+        for name in (LIGHT, heat)
+        if name in figures.index
+    ]
+    text = gettext("{room}: {bands}.", room=room.space.label, bands="; ".join(parts))
+    return " ".join([text, *(_likely(row) for _, row in room.bands.verdicts.iterrows())])
+
+
+BAND_WORDS = {
+    "da300": N_("daylight autonomy {median} % (90 % band {low} to {high})"),
+    "cooling_kwh": N_("cooling {median} kWh (90 % band {low} to {high})"),
+    "heating_kwh": N_("heating {median} kWh (90 % band {low} to {high})"),
+    "highest_operative_c": N_("highest operative temperature {median} °C (90 % band {low} to {high})"),
+}
+
+
+def _likely(verdict: pd.Series) -> str:
+    facts = {"rule": gettext(RULE_WORDS[str(verdict["rule"])]), "times": f"{verdict['met_percent']:.0f}"}
+    if not verdict["decided_by"]:
+        return gettext("{rule}: met in {times} of 100 cases.", **facts)
+    return gettext(
+        "{rule}: met in {times} of 100 cases; what would make it surer: {input}, {share} % of the variance.",
+        **facts,
+        input=gettext(INPUTS[str(verdict["decided_by"])].label),
+        share=f"{verdict['decided_percent']:.0f}",
+    )

@@ -9,7 +9,7 @@ import pandas as pd
 
 from bim.report.issue import Issue, IssueText
 from bim.report.ranking import ranked
-from scenes.language.catalogue import N_, gettext
+from scenes.language.catalogue import N_, decimal, gettext
 from scenes.language.numbers import cell, semicolons
 from scenes.report.names import Quantity, quantity
 from scenes.results import LuminancePicture, RoomYear
@@ -188,9 +188,9 @@ def plain_value(value: object) -> str:
     if isinstance(value, bool):
         return gettext("yes") if value else gettext("no")
     if isinstance(value, float):
-        return f"{value:.6g}"
+        return decimal(f"{value:.6g}")
     if isinstance(value, list | tuple):
-        return ", ".join(map(str, value)) or "–"
+        return ", ".join(map(plain_value, value)) or "–"
     return "–" if value is None else str(value)
 
 

@@ -18,7 +18,7 @@ from scenes.report.glare_figures import sun_words
 from scenes.report.headline import FAIR, GOOD, POOR, WARM_C, Card, dgp_error, heated, occupied
 from scenes.report.method import METHODS
 from scenes.report.names import rooms_counted, systems_counted
-from scenes.report.sensitivity import sensitivity_sentence
+from scenes.report.sensitivity import bands_sentence, sensitivity_sentence
 from scenes.report.tables import GLARE_WORDS, Column, Table, glare_class, step_hours
 from scenes.results import ExploredRoom, LuminancePicture, RoomYear, RunResult
 
@@ -148,6 +148,7 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
         (gettext("Overheating"), _overheating(result)),
         (gettext("Shading"), _shading(result)),
         *([(gettext("Inputs that matter most"), matter)] if (matter := sensitivity_sentence(result)) else []),
+        *([(gettext("How sure"), bands)] if (bands := bands_sentence(result)) else []),
     )
     named = [(r.space.label, r, card) for r, card in zip(result.spaces, cards, strict=True)]
     answer = rooms_answer([judged(name, figures) for name, _, figures in named])

@@ -19,6 +19,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.stored_arrays import StoredArrays
 from scenes.results import (
+    Bands,
     DaylightResult,
     ExploredRoom,
     GlareResults,
@@ -27,6 +28,7 @@ from scenes.results import (
     SpectralYear,
     ThermalResult,
 )
+from scenes.room.bands import LightSamples, deviations, draws, room_bands
 from scenes.room.operation_tables import ComfortTable, OperationTables
 from scenes.room.sensitivities import heat_sensitivities
 from scenes.room.zone import RoomZone, balances, coupled, inner_sun_note
@@ -204,6 +206,8 @@ class DaylitRoom:
     annual_glare: pd.DataFrame | None = None
     spectral: SpectralYear | None = None
     sensitivities: pd.DataFrame | None = None  # of its light; None: not asked for
+    samples: LightSamples | None = None  # of its light, for bands
+    bands: Bands | None = None
     dgp: AnnualGlare | None = None
     dgp_sunny_hour_error: float = 0.0
     as_lobe: dict[str, float] = field(default_factory=dict)
@@ -212,14 +216,20 @@ class DaylitRoom:
     template: str = ""
     borrowed: str = ""
 
-    def with_sensitivities(self, of_heat: pd.DataFrame) -> DaylitRoom:
-        """The room with the derivatives of its heat besides."""
-        return replace(self, sensitivities=pd.concat([self.sensitivities, of_heat], ignore_index=True))
+    def with_sensitivities(self, of_heat: pd.DataFrame, seed: int) -> DaylitRoom:
+        """The room with the derivatives of its heat besides, and the bands that follow from all.
+
+        Args: seed: of the samples.
+        """
+        table, bands = pd.concat([self.sensitivities, of_heat], ignore_index=True), None
+        if self.samples is not None:
+            bands = room_bands(self.samples, table, draws(deviations(self.zone.operation), seed))
+        return replace(self, sensitivities=table, samples=None, bands=bands)
 
     def with_heat(self, heat: Heat) -> RoomYear:
         """The room's year, with temperatures and operation."""
         thermal, operation = heat
-        names = (one.name for one in fields(self) if one.name not in {"zone", "issues"})
+        names = (one.name for one in fields(self) if one.name not in {"zone", "issues", "samples"})
         return RoomYear(
             heat=thermal,
             operation=operation,
@@ -335,12 +345,14 @@ def coupled_years(
     progress: Progress = silent,
     *,
     store: StoredArrays | None = None,
+    seed: int = 0,
 ) -> tuple[list[RoomYear], tuple[str, ...]]:
     """The years of rooms that exchange heat through the parts between them, and notes on that.
 
     Args:
         tables: of all rooms; terrain of the site, air through open doors.
         store: of the rooms' heat on disk; None: in memory.
+        seed: of the samples for bands.
     """
     progress("heat balance", 0.0)
     zones, links, _ = coupled([room.zone for room in rooms], tables.air.door_m3_s)
@@ -348,7 +360,7 @@ def coupled_years(
     progress("heat balance", 1.0)
     if any(room.sensitivities is not None for room in rooms):
         derived = heat_sensitivities(zones, weather, step_s, terrain=tables.terrain, air_links=links)
-        rooms = [room.with_sensitivities(of_heat) for room, of_heat in zip(rooms, derived, strict=True)]
+        rooms = [room.with_sensitivities(of_heat, seed) for room, of_heat in zip(rooms, derived, strict=True)]
     years = [room.with_heat(heat) for room, heat in zip(rooms, heats, strict=True)]
     return years, (_coupling_note(zones), *inner_sun_note(zones, weather.step_h))
 

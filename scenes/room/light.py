@@ -100,7 +100,7 @@ def _scene(room: RoomInputs, building: Building) -> tuple[DaylightScene, InnerGl
         room.options.outputs.picture_size,
         inner=glass,
         file_sensors=room.file_sensors,
-        sensitivities=room.options.outputs.sensitivities,
+        sensitivities=room.options.outputs.derives,
     )
     return scene, glass
 

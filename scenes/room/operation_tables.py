@@ -475,6 +475,28 @@ def operated_tables(tables: TomlTable) -> Iterator[tuple[str, TomlTable]]:
         yield from tables_within(getattr(tables, part), part)
 
 
+Deviation = Annotated[float, Field(ge=0)]
+
+
+class BandsTable(TomlTable):
+    """Standard deviations of inputs for `--bands`, in place of the usual ones; 0: the input is known."""
+
+    reflectance_floor: Deviation | None = None
+    reflectance_walls: Deviation | None = None
+    reflectance_ceiling: Deviation | None = None
+    reflectance_furniture: Deviation | None = None
+    reflectance_ground: Deviation | None = None
+    transmittance_percent: Deviation | None = None
+    sky_percent: Deviation | None = None
+    tilt_deg: Deviation | None = None
+    g_value: Deviation | None = None
+    u_value: Deviation | None = None
+    gains_percent: Deviation | None = None
+    infiltration_percent: Deviation | None = None
+    heating_set_c: Deviation | None = None
+    cooling_set_c: Deviation | None = None
+
+
 class OperationTables(TomlTable):
     """Operation of rooms: a file of `cfs run` and `cfs study`, a part of `cfs thermal`'s file."""
 
@@ -495,6 +517,7 @@ class OperationTables(TomlTable):
     rooms: tuple[RoomsTable, ...] = ()  # the first entry that names a room applies to it
     schedules: dict[str, ScheduleTable] = Field(default_factory=dict)
     calendar: CalendarTable = CalendarTable()
+    bands: BandsTable = BandsTable()
 
     @model_validator(mode="after")
     def _has_one_control(self) -> OperationTables:

@@ -50,9 +50,15 @@ class Outputs:
     annual_glare: bool = False  # rate every lit hour, not only the pictures
     spectral: bool = False  # alpha-opic quantities and colour of the light
     sensitivities: bool = False  # derivatives of the results by their inputs
+    bands: bool = False  # medians with 5 and 95 % by the uncertainty of the inputs; derivatives too
     channels: int = 81  # bands of wavelength for that, a key of CHANNEL_SETS
     glare_sources: str = "evalglare"  # one of GLARE_SOURCES
     glare_sun: str = "source"  # its disc: a source of its own, or part of its pixels
+
+    @property
+    def derives(self) -> bool:
+        """Whether derivatives are computed."""
+        return self.sensitivities or self.bands
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,8 +96,8 @@ class RoomOptions:
             raise ValueError("annual glare needs the three-phase or the five-phase method")
         if self.outputs.spectral and self.method == "point-in-time":
             raise ValueError("spectral needs the three-phase or the five-phase method")
-        if self.outputs.sensitivities and self.method == "point-in-time":
-            raise ValueError("sensitivities need the three-phase or the five-phase method")
+        if self.outputs.derives and self.method == "point-in-time":
+            raise ValueError("sensitivities and bands need the three-phase or the five-phase method")
 
     @property
     def sky(self) -> dict[str, str]:
@@ -147,6 +153,7 @@ NAMES = {
     "annual_glare": ("outputs", "annual_glare"),
     "spectral": ("outputs", "spectral"),
     "sensitivities": ("outputs", "sensitivities"),
+    "bands": ("outputs", "bands"),
     "channels": ("outputs", "channels"),
     "glare_sources": ("outputs", "glare_sources"),
     "glare_sun": ("outputs", "glare_sun"),

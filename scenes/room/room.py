@@ -129,7 +129,7 @@ def compute_room(
         with times.stage("sensitivities"):
             terrain = (lit.zone.operation or OperationTables()).terrain
             (of_heat,) = heat_sensitivities([lit.zone], weather, options.heat_step_s, terrain=terrain)
-            lit = lit.with_sensitivities(of_heat)
+            lit = lit.with_sensitivities(of_heat, options.sampling.seed)
     return replace(lit, seconds=times.seconds).with_heat(heat)
 
 
@@ -190,7 +190,7 @@ def lit_room(
         message = "the explorer knows one state of the trees: give them one transmittance"
         raise DataError(message, file=building.file, field="--explore")
     hours = wanted_hours(options.outputs.picture_hours, weather.midpoints, room.skies.lit)
-    outdoors = year = dgp = rated = explored = surfaces = choice = spectral = sensitivities = None
+    outdoors = year = dgp = rated = explored = surfaces = choice = spectral = sensitivities = samples = None
     dgp_error = 0.0
     times = StageTimes()
 
@@ -237,9 +237,9 @@ def lit_room(
     if options.outputs.spectral:
         with times.stage("spectral"):
             spectral = room_spectral(room, light, state, daylight, progress=progress)
-    if options.outputs.sensitivities:
+    if options.outputs.derives:
         with times.stage("sensitivities"):
-            sensitivities = light_sensitivities(room, light, state, daylight, year, spectral)
+            sensitivities, samples = light_sensitivities(room, light, state, daylight, year, spectral)
     with times.stage("thermal"):
         surfaces = surfaces or zone_surfaces(room)
         if outdoors is None:
@@ -256,6 +256,7 @@ def lit_room(
         year,
         spectral=spectral,
         sensitivities=sensitivities,
+        samples=samples,
         dgp=dgp,
         dgp_sunny_hour_error=dgp_error,
         as_lobe=as_lobe,

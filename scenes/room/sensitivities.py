@@ -11,8 +11,9 @@ of the table beside the figures of the results, which count whole hours.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -22,9 +23,19 @@ from scipy.special import ndtr
 
 from mitsuba_cfs.methods.light import eye_illuminance, illuminance, illuminance_with_noise, relative_error_of_mean
 from mitsuba_cfs.methods.sensitivity import LightDerivative, by_ground, by_reflectances
-from mitsuba_cfs.metrics.schedules import lm83_hours
+from mitsuba_cfs.metrics.schedules import daylight_hours, lm83_hours
 from mitsuba_cfs.sky.weather import Weather
 from scenes.results import MELANOPIC_BY_DAY, DaylightResult, SpectralYear
+from scenes.room.bands import (
+    GLARE_SHARE,
+    SDA_ACCEPTED,
+    LightSamples,
+    Margin,
+    deviations,
+    draws,
+    lit_samples,
+    provision_margin,
+)
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
 from scenes.room.zone import RoomZone, balances, climate, lamp_daylight, lamp_power, per_window
@@ -38,6 +49,7 @@ Array = NDArray[np.float64]
 TARGET_LX = 300.0  # of daylight autonomy
 HALF = 50.0  # of sDA [%]
 GLARE = 0.40  # DGP from which on glare disturbs
+RULES = ("lm83_accepted", "en17037_minimum", "en17037_glare")  # whose probability bands state
 WIDTHS = {  # of the smoothed limits, a standard deviation
     "da300": 30.0,  # [lx]
     "sda300_50": 5.0,  # [%] of DA, besides
@@ -82,8 +94,8 @@ def light_sensitivities(
     daylight: DaylightResult,
     year: pd.DataFrame | None = None,
     spectral: SpectralYear | None = None,
-) -> pd.DataFrame:
-    """Derivatives of the room's light by its inputs, see `sensitivity_table`.
+) -> tuple[pd.DataFrame, LightSamples | None]:
+    """Derivatives of the room's light by its inputs, see `sensitivity_table`; samples for bands, if asked for.
 
     Args:
         state: [H, G] of the shading.
@@ -91,7 +103,13 @@ def light_sensitivities(
         spectral: None: no melanopic light.
     """
     figures = _LightFigures(room, light, state, daylight, year, spectral)
-    return pd.concat([figures.rows(change) for change in light_changes(room, light, state)], ignore_index=True)
+    changes = list(light_changes(room, light, state))
+    table = pd.concat([figures.rows(one) for one in changes if one.key != "tracing"], ignore_index=True)
+    samples = None
+    if room.options.outputs.bands:
+        drawn = draws(deviations(room.operation), room.options.sampling.seed)
+        samples = figures.samples(changes, drawn)
+    return table, samples
 
 
 def light_changes(room: RoomInputs, light: RoomLight, state: NDArray[np.int64]) -> Iterator[Change]:
@@ -122,6 +140,10 @@ def light_changes(room: RoomInputs, light: RoomLight, state: NDArray[np.int64]) 
     values, noise = illuminance_with_noise(light.light, rows)
     relative = float(relative_error_of_mean(values, noise)[plane].mean())
     yield Change("transmittance_percent", 100.0, lit / 100.0, relative)
+    yield Change("sky_percent", 100.0, lit / 100.0, relative)
+    # sensors share paths: their errors are taken as one
+    errors = np.append(relative_error_of_mean(values, noise), relative)
+    yield Change("tracing", 0.0, lit * errors[:, None], 0.0)
     tilt = _by_tilt(room, light, rows)
     if tilt is not None:
         value, derivative = tilt
@@ -226,6 +248,51 @@ class _LightFigures:
         if tables is not None and tables.gains.dims:
             powers = [self._lamps(sign * change.illuminance, change) for sign in (1.0, -1.0)]
             yield "lighting_kwh", (self._lamps(None, change), (powers[0] - powers[1]) / (2 * self._step(change)))
+
+    def samples(self, changes: Sequence[Change], drawn: Mapping[str, Array]) -> LightSamples:
+        """The figures of light for drawn inputs."""
+        room, sensors = self._room, len(self._values)
+        slopes = {one.key: np.concatenate([one.illuminance[self._plane], one.illuminance[-1:]]) for one in changes}
+        whole = np.concatenate([self._values, self._eye[None]])
+        of_year = room.skies.once(daylight_hours, room.weather)
+        half, half_hours = of_year[self._lit], int(of_year.sum())
+        found: dict[str, list[Array]] = {}
+        blocks = chain([whole[None]], lit_samples(whole, slopes, drawn))  # as computed first
+        for block in blocks:
+            for name, values in self._counts(block, sensors, half, half_hours).items():
+                found.setdefault(name, []).append(values)
+        every = {name: np.concatenate(values) for name, values in found.items()}
+        margins = {name: Margin(v[1:], float(v[0])) for name, v in every.items() if name in RULES}
+        figures = {name: (UNITS[name], float(v[0]), v[1:]) for name, v in every.items() if name not in RULES}
+        return LightSamples(figures, margins)
+
+    def _counts(
+        self, lit: NDArray[np.floating], sensors: int, half: NDArray[np.bool_], half_hours: int
+    ) -> dict[str, Array]:
+        """Figures and margins of rules [n] by the illuminance of the sensors and the eye [n, S + 1, L]."""
+        room, plane, eye = self._room, lit[:, :sensors], lit[:, -1].astype(float)
+        step_h, used = room.weather.step_h, self._used
+        autonomy = 100.0 * (plane[..., self._counted] >= TARGET_LX).sum(axis=-1) / self._hours
+        spatial = 100.0 * (autonomy >= HALF).mean(axis=-1)
+        found = {
+            "mean_illuminance_lx": plane.sum(axis=-1, dtype=float).mean(axis=-1) / room.skies.hours,
+            "da300": autonomy.mean(axis=-1),
+            "sda300_50": spatial,
+            "lm83_accepted": spatial - SDA_ACCEPTED,
+            "en17037_minimum": provision_margin(plane, half, half_hours),
+        }
+        if self._year is not None:
+            dgp, by_eye = dgp_and_slope(self._year["dgp"].to_numpy(float), self._year["ev"].to_numpy(float))
+            moved = dgp + by_eye * (eye - self._eye)
+            above = (moved > GLARE)[:, used].sum(axis=-1)
+            found["glare_hours"] = step_h * above
+            found["en17037_glare"] = GLARE_SHARE - 100.0 * above / max(int(room.occupied.sum()), 1)
+        if self._spectral is not None:
+            seen = self._spectral["melanopic_edi_lx"].to_numpy(float)
+            moved = seen * np.divide(eye, self._eye, out=np.ones_like(eye), where=self._eye > 0)
+            found["melanopic_edi_mean_lx"] = moved[:, used].mean(axis=-1)
+            found["melanopic_hours"] = step_h * (moved >= MELANOPIC_BY_DAY)[:, used].sum(axis=-1)
+        return found
 
     def _step(self, change: Change) -> float:
         return STEP_SHARE * INPUTS[change.key].deviation

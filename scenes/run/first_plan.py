@@ -78,6 +78,7 @@ def plan_options(options: RoomOptions) -> RoomOptions:
         annual_glare=False,
         spectral=False,
         sensitivities=False,
+        bands=False,
         sensor_spacing=max(options.grid.spacing, SPACING),
         **fewer,
     )

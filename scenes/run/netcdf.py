@@ -66,13 +66,17 @@ def year_dataset(result: RunResult) -> Dataset:
     version = metadata.version("mitsuba-cfs")
     about = {
         "Conventions": "CF-1.11",
-        "title": f"{manifest['building']}: daylight, glare, temperatures of {len(rooms)} rooms",
+        "title": f"{manifest['building']}: daylight, glare, temperatures of {_counted(len(rooms))}",
         "source": f"mitsuba-cfs {version}, {result.method}, {manifest['system']}",
         "site": str(manifest["site"]),
     }
     owners = ("sensor_room", "surface_name", "surface_room", "picture_time", "picture_room")
     places = [name for name in (*PLACES, *owners) if name in variables]
     return xr.Dataset(variables, coordinates, about).set_coords(places)
+
+
+def _counted(rooms: int) -> str:
+    return "1 room" if rooms == 1 else f"{rooms} rooms"
 
 
 def write_netcdf(result: RunResult, path: str | PathLike[str]) -> None:

@@ -162,6 +162,9 @@ def _write_room(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
         write_table(eye_spectrum(room.spectral, times), place / "eye_spectrum.parquet")
     if room.sensitivities is not None:
         _csv(room.sensitivities, place / "sensitivities.csv", index=False)
+    if room.bands is not None:
+        _csv(room.bands.figures, place / "bands.csv", index=False)
+        _csv(room.bands.verdicts, place / "bands_verdicts.csv", index=False)
     _csv(pd.DataFrame([heat.comfort_summary]), place / "comfort.csv", index=False)
     for picture in room.glare.pictures:
         name = f"view_{times[picture.hour]:%m-%d_%Hh}"

@@ -102,7 +102,13 @@ def computed_rooms(
     if results:
         tables = OperationTables() if inputs.operation is None else inputs.operation.tables
         years, coupling = coupled_years(
-            results, inputs.weather, options.room.heat_step_s, tables, progress, store=store
+            results,
+            inputs.weather,
+            options.room.heat_step_s,
+            tables,
+            progress,
+            store=store,
+            seed=options.room.sampling.seed,
         )
         variants.return_memory()
         notes += coupling if len(years) > 1 else []

@@ -243,6 +243,11 @@ def room_figures(room: RoomYear) -> tuple[dict[str, float | str], dict[str, NDAr
         figures |= {k: float(v) for k, v in room.operation.summary.items()}
     if room.spectral is not None:
         figures |= room.spectral.summary
+    if room.bands is not None:
+        for _, row in room.bands.figures.iterrows():
+            figures |= {f"{row['figure']}_{name}": float(row[name]) for name in ("p5", "median", "p95")}
+        for _, row in room.bands.verdicts.iterrows():
+            figures[f"{row['rule']}_met_percent"] = float(row["met_percent"])
     figures |= {f"{stage}_s": seconds for stage, seconds in room.seconds.items()}
     times = heat.temperatures.index.to_numpy().astype("datetime64[s]")
     arrays: dict[str, NDArray[Any]] = {

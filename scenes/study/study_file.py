@@ -21,7 +21,8 @@ from scenes.room.options import CHOICES, RoomOptions, named_types
 from scenes.room.schedules import Hours
 from scenes.toml_file import OutdoorTable, ReadTable, TomlTable, read_options, read_table, validated
 
-SPECTRAL_METHODS = ("three-phase", "five-phase")
+PHASE_METHODS = ("three-phase", "five-phase")
+NEED_PHASES = ("spectral", "sensitivities", "bands")  # options
 OF_THE_GRID = ("method", "annual_glare")
 # Options that mean what a key of an operation file means
 OF_TABLES = {
@@ -160,8 +161,9 @@ class Study(_Table, OutdoorTable):
         turned = [angle % 360.0 for angle in self.orientations_deg]
         unique("orientations_deg", turned)
         unique("methods", self.methods)
-        if self.options.spectral and not set(self.methods) <= set(SPECTRAL_METHODS):
-            raise ValueError(f"options.spectral: needs methods of {', '.join(SPECTRAL_METHODS)}")
+        for name in NEED_PHASES:
+            if getattr(self.options, name) and not set(self.methods) <= set(PHASE_METHODS):
+                raise ValueError(f"options.{name}: needs methods of {', '.join(PHASE_METHODS)}")
         return self
 
     def inputs(

@@ -82,6 +82,15 @@ def test_the_building_is_seen_and_a_room_is_chosen_in_the_view(browser, served) 
     assert browser.value("document.querySelector('#room-rows tr.selected').innerText").find(name) > 0
 
 
+def test_a_fix_by_a_flag_is_told_as_one_of_the_command_line(browser) -> None:
+    """The page has no button for it; rooms keep their words whole where the table scrolls."""
+    told = browser.value(
+        "import('/app/building.js').then((module) => ['--join makes one', 'draw it', ''].map(module.remedy))"
+    )
+    assert told == ["; on the command line: --join makes one", "; draw it", ""]
+    assert browser.value("getComputedStyle(document.querySelector('#room-rows td')).overflowWrap") == "break-word"
+
+
 def test_a_room_is_left_out_and_its_use_stated_by_click(browser, served) -> None:
     go(browser, "building")
     browser.click("#room-rows tr:nth-child(2) input")

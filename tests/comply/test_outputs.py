@@ -156,6 +156,8 @@ def test_the_dossier_begins_with_its_answers(result):
     assert html.index('class="answer"') < html.index('id="contents"') < html.index("Cell.")
     assert 'class="preview"' not in html
     assert html.count('class="answer"') == 2
+    french = dossier_html(result, page=PageOptions(language="fr"))
+    assert french.count("\u00a0:</b>") == 2 and ":</b>" not in french.replace("\u00a0:</b>", "")
     quick = dossier_html(result, quick=True)
     assert '<p class="preview" role="note">Quick run' in quick and quick.count("Quick run:") == 1
 

@@ -252,6 +252,27 @@ def test_a_phone_scrolls_in_one_direction(address, tmp_path) -> None:
         assert page.faults == []
 
 
+@pytest.mark.parametrize(("width", "height"), [(1440, 900), (390, 844)])
+def test_hour_display_glare_and_picture_are_on_one_screen(address, tmp_path, width, height) -> None:
+    """Nothing of them is below the first screen, and none covers another."""
+    parts = "#date", "#hour", "#play", "#colours", "#one .dgp", "#one .eye"
+    with Page(tmp_path, width=width, height=height) as page:
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        page.send("Emulation.setDeviceMetricsOverride", **size)
+        page.open(address)
+        boxes = [
+            page.value(
+                f"(({{left, top, right, bottom}}) => [left, top, right, bottom])"
+                f"(document.querySelector('{part}').getBoundingClientRect())"
+            )
+            for part in parts
+        ]
+    assert all(bottom <= height for *_, bottom in boxes), dict(zip(parts, boxes, strict=True))
+    for i, (left, top, right, bottom) in enumerate(boxes):
+        for other in boxes[:i]:
+            assert left >= other[2] - 1 or other[0] >= right - 1 or top >= other[3] - 1 or other[1] >= bottom - 1
+
+
 def test_a_missing_file_is_said(address, tmp_path) -> None:
     folder = Path(address.removeprefix("file://").partition("#")[0]).parent
     (tmp_path / "copy").mkdir()

@@ -227,3 +227,10 @@ def test_the_line_of_sight_itself_and_its_opposite_have_angles():
         np.testing.assert_allclose(sigma, [0.0, np.pi, np.pi / 2], atol=1e-7)
         assert np.isfinite(tau).all()
     assert beyond > 10
+
+
+def test_a_source_too_small_for_the_discomfort_rating_is_no_glare():
+    # Q of 1e-7 sr is 20.4e-7 + 1.52 (1e-7)^0.2 - 0.075 = -0.0145: its root would be no number
+    rating = indices.discomfort_glare_rating([1e6, 1e6], [1e-7, 1e-7], [1.0, 1.0], 100.0)
+    assert rating == 0.0
+    assert indices.visual_comfort_probability(rating) == 100.0

@@ -108,6 +108,9 @@ def test_the_hours_are_one_frame(year) -> None:
     assert len(hours) == HOURS and hours.columns.is_unique and hours.index.name == "time"
     assert hours["illuminance_lx"].to_numpy() == pytest.approx(year.daylight.illuminance.mean(axis=1, dtype=float))
     assert {"operative_c", "transmitted_w", "within_80"} <= set(hours)
+    units = hours.attrs["units"]
+    assert set(units) == set(hours)
+    assert (units["illuminance_lx"], units["operative_c"], units["transmitted_w"]) == ("lx", "degC", "W")
 
 
 def test_a_prompt_shows_one_line(year) -> None:

@@ -64,6 +64,11 @@ WRONG = {
         BOX + SYSTEM + CLIMATE + "[options]\nspectral = true\n",
         "options.spectral: needs methods of three-phase, five-phase",
     ),
+    "bands with paths": (
+        'methods = ["point-in-time"]\n',
+        BOX + SYSTEM + CLIMATE + "[options]\nbands = true\n",
+        "options.bands: needs methods of three-phase, five-phase",
+    ),
     "no time": (
         "",
         BOX + SYSTEM + CLIMATE + '[auto]\ntime_budget = "soon"\n',
@@ -201,7 +206,7 @@ def test_finished_cases_are_not_computed_again(done, capsys):
     path, out = done
     before = {f: f.stat().st_mtime_ns for f in (out / "cases").iterdir()}
     assert run(["study", str(path), "--out", str(out)]) == 0
-    assert "4 were there, 0 failed" in capsys.readouterr().out
+    assert "4 from an earlier run, 0 failed" in capsys.readouterr().out
     assert {f: f.stat().st_mtime_ns for f in (out / "cases").iterdir()} == before
 
 

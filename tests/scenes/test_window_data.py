@@ -58,6 +58,22 @@ def grey_system(**more) -> FenestrationSystem:
     return FenestrationSystem("grey", grey(0.2), grey(0.2), **more)
 
 
+@pytest.mark.parametrize(
+    ("stated", "known"),
+    [
+        ({"u_value": 1.1, "g_value": 0.4, "shading_position": "internal"}, True),
+        ({"u_value": 1.1, "shading_position": "internal"}, False),
+        ({"g_value": 0.4, "shading_position": "internal"}, False),
+        ({}, False),
+    ],
+)
+def test_the_error_against_energyplus_belongs_to_stated_values(stated, known):
+    """The cases that it was found in had U, g and the shade's position."""
+    model = thermal_system(grey_system(**stated)).model
+    assert ("RMS error against EnergyPlus in 128 cases" in model) == known
+    assert ("error unknown: it was compared" in model) != known
+
+
 def test_layers_give_u_g_films_and_resistance_by_default():
     heat = thermal_system(grey_system(closure=Closure("layers", unit=INTERNAL)))
     data = iso15099_data(INTERNAL)

@@ -2,6 +2,10 @@
 import { byId, commandLine, fill, h } from "./dom.js";
 
 const { gettext, ngettext, fixed } = cfs;
+
+// What to do about an issue; flags are for the command line, as this page has no such button
+export const remedy = (fix) => !fix ? "" : fix.includes("--")
+  ? `; ${gettext("on the command line: {fix}", { fix })}` : `; ${fix}`;
 // Uses of rooms by the keys of scenes/comply/uses.toml that people choose from
 const USES = () => ({
   office: gettext("office"), meeting: gettext("meeting room"), classroom: gettext("classroom"), nursery: gettext("nursery"),
@@ -120,7 +124,7 @@ function drawIssues() {
   const severity = SEVERITY();
   fill(byId("issues"), page.check.issues.map((issue) => h("li", {},
     h("span", { class: `chip ${issue.severity}` }, severity[issue.severity]),
-    h("div", {}, h("b", {}, issue.what), h("p", {}, `${issue.effect}${issue.fix ? `; ${issue.fix}` : ""}`),
+    h("div", {}, h("b", {}, issue.what), h("p", {}, issue.effect, remedy(issue.fix)),
       h("p", { class: "soft" }, issue.where, issue.glass_m2 ? `, ${fixed(issue.glass_m2, 2)} m² ${gettext("of glass")}` : "")))));
   byId("no-issues").hidden = page.check.issues.length > 0;
 }
