@@ -73,6 +73,9 @@ class LayerResistance:
         return 1.0 / (c[0] + c[1] * x + c[2] * d + c[3] * d**2 + c[4] * x * d + c[5] * x**2)
 
 
+TABLE_HEAD = 6  # numbers of a "table" before its conductances
+
+
 @register_jitable(**INLINED)
 def table_conductance(c: NDArray[np.float64], mean_c: float, difference: float) -> float:
     """1/R [W/(m2 K)] of a "table"; beyond its grid that of the edge."""
@@ -81,7 +84,7 @@ def table_conductance(c: NDArray[np.float64], mean_c: float, difference: float) 
     x = min(max((difference - c[3]) / c[4], 0.0), columns - 1.0)
     i, j = min(int(y), rows - 2), min(int(x), columns - 2)
     y, x = y - i, x - j
-    at = 6 + i * columns + j
+    at = TABLE_HEAD + i * columns + j
     low = (1.0 - x) * c[at] + x * c[at + 1]
     high = (1.0 - x) * c[at + columns] + x * c[at + columns + 1]
     return (1.0 - y) * low + y * high
@@ -359,11 +362,17 @@ def with_u_value(system: Fenestration, u_value: float) -> Fenestration:
 
 
 def _with_added(resistance: LayerResistance, change: float, difference: float) -> LayerResistance:
-    """A resistance with so much more [m2 K/W] at 10 degC and a difference, and in proportion elsewhere."""
+    """A resistance with so much more [m2 K/W] at 10 degC and a difference.
+
+    A table has it everywhere, as `iso15099_data` of a stated U; others in proportion.
+    """
     first, *others = resistance.coefficients
     if resistance.kind == "linear U":
         moved = 1.0 / (1.0 / first + change)
         return LayerResistance(resistance.kind, (moved, others[0] * moved / first, others[1]))
+    if resistance.kind == "table":
+        grid, conductances = resistance.coefficients[:TABLE_HEAD], resistance.coefficients[TABLE_HEAD:]
+        return LayerResistance(resistance.kind, (*grid, *(1.0 / (1.0 / c + change) for c in conductances)))
     nominal = float(resistance.at(10.0, difference))
     factor = (nominal + change) / nominal
     power = 1 if resistance.kind == "constant" else -1  # the others are conductances

@@ -15,7 +15,7 @@ from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.report.sensitivity import sensitivity_sentence
 from scenes.room.sensitivities import dgp_and_slope
 from scenes.uncertain_inputs import INPUTS
-from thermal.blackbox import Fenestration, linear_u, with_u_value
+from thermal.blackbox import Fenestration, conductance_table, linear_u, with_u_value
 
 FEW = {
     "quick": True,
@@ -135,6 +135,15 @@ def test_a_window_of_another_u(resistance):
     films = one.r_outer + one.r_inner
     assert moved.u_value == 1.6
     assert np.isclose(1 / (float(moved.layer_resistance.at(10.0, 5.0)) + films), 1.6, rtol=1e-6)
+
+
+def test_a_table_of_resistances_has_as_much_more_everywhere():
+    grid = np.array([0.0, 10.0, 20.0]), np.array([1.0, 11.0]), np.array([[1.5, 1.6], [1.6, 1.7], [1.7, 1.8]])
+    one = Fenestration("pane", 1.3, resistance=conductance_table(*grid))
+    moved = with_u_value(one, 1.6)
+    for mean, difference in ((0.0, 1.0), (10.0, 11.0), (20.0, 1.0)):
+        more = moved.layer_resistance.at(mean, difference) - one.layer_resistance.at(mean, difference)
+        assert np.isclose(more, 1 / 1.6 - 1 / 1.3)
 
 
 def test_path_tracing_has_no_sensitivities():
