@@ -127,13 +127,13 @@ def test_study_files_in_the_docs_are_read(folder):
 
 
 def test_the_design_file_in_the_docs_is_read(folder):
-    from scenes.design.candidates import check_variables
+    from scenes.design.candidates import mattering
     from scenes.design.design_file import read_design
 
     (code,) = examples(REPOSITORY / "docs" / "design.md", "toml")
     shutil.copy(WEATHER.with_name("loads.toml"), folder)
     (folder / "design.toml").write_text(code)
-    check_variables(read_design(folder / "design.toml"), folder)
+    mattering(read_design(folder / "design.toml"), folder)
 
 
 def test_the_system_and_operation_files_of_the_quick_start_are_read(folder):

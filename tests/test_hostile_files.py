@@ -223,6 +223,13 @@ def text(content: str) -> Callable[[Path], object]:
     return lambda file: file.write_text(content)
 
 
+def read_searched(file: Path) -> None:
+    from scenes.design.candidates import mattering
+    from scenes.design.design_file import read_design
+
+    mattering(read_design(file), file.parent)
+
+
 def weather(file: Path) -> None:
     file.write_bytes(WEATHER.read_bytes())
 
@@ -230,6 +237,13 @@ def weather(file: Path) -> None:
 def heat_study(file: Path) -> None:
     source = REPOSITORY / "docs" / "tutorials" / "office_heated_slab.toml"
     file.write_text(source.read_text().replace("../../scenes/demo", str(DEMO)))
+
+
+def design_study(file: Path) -> None:
+    from tests.design.designs import BLIND, COOLING, ENERGY, PLAIN, RULE, SEARCH, TILT, design_file
+
+    limit = '[[constraint]]\nrule = "en17037 glare"\n'
+    design_file(file.parent, PLAIN, BLIND, TILT, RULE, COOLING, ENERGY, limit, SEARCH)
 
 
 def wea(file: Path) -> None:
@@ -305,6 +319,7 @@ ROWS = {
     "matrix": Row("m.mtx", matrix, mutators.of_picture, read_matrix),
     "matrix of text": Row("m.mtx", matrix_of_text, mutators.of_text, read_matrix),
     "study": Row("study.toml", copied(DEMO / "study.toml"), mutators.of_toml, read_study),
+    "design": Row("design.toml", design_study, mutators.of_toml, read_searched),
     "operation": Row("controlled.toml", copied(DEMO / "controlled.toml"), mutators.of_toml, read_operation),
     "heat study": Row("office.toml", heat_study, mutators.of_toml, read_heat_study),
     "pv study": Row("facade_pv.toml", copied(DEMO / "facade_pv.toml"), mutators.of_toml, read_pv_study),

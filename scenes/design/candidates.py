@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
@@ -95,10 +95,10 @@ def value_of(variable: VariableTable, at: float | int) -> Any:
     return variable.options[int(at)] if variable.options else float(at)
 
 
-def check_variables(design: Design, folder: Path) -> None:
-    """Raise `DataError` for the first variable with a value that cannot be, others at their first.
+def mattering(design: Design, folder: Path) -> tuple[frozenset[str], ...]:
+    """The names of the variables that matter to each system that may be chosen; one without a choice.
 
-    A system that a variable does not matter to is passed over.
+    Raises: `DataError` for the first variable with a value that cannot be, others at their first.
     """
     middle: Point = tuple(0 if one.options else one.span[0] for one in design.variable)
     systems = next((i for i, one in enumerate(design.variable) if one.key == SYSTEM), None)
@@ -106,18 +106,35 @@ def check_variables(design: Design, folder: Path) -> None:
     if systems is not None:
         count = len(design.variable[systems].options)
         starts = [(*middle[:systems], number, *middle[systems + 1 :]) for number in range(count)]
-    mattered = set()
+    found = []
     for start in starts:
+        mattered = set() if systems is None else {design.variable[systems].name}
         for number, one in enumerate(design.variable):
             ends = (0, len(one.options) - 1) if one.is_number and one.options else range(len(one.options))
             for at in ends or one.span:
                 point = (*start[:number], at, *start[number + 1 :])
                 made = candidate(design, point, folder, quick=design.search.quick, traced=False)
-                mattered |= {name for name, _ in made.values}
+                if number != systems:
+                    mattered |= {name for name, _ in made.values}
+        found.append(frozenset(mattered))
     for number, one in enumerate(design.variable):
-        if one.name not in mattered:
+        if not any(one.name in mattered for mattered in found):
             key = one.key or next(iter(next(iter(one.choices.values()))), "")
             raise DataError(f"no system has {key!r}", field=f"variable.{number}.key")
+    return tuple(found)
+
+
+def same_candidate(design: Design, matter: tuple[frozenset[str], ...], point: Point) -> Point:
+    """The point with the variables that do not matter to its system at their first value.
+
+    Args: matter: of `mattering`.
+    """
+    systems = next((i for i, one in enumerate(design.variable) if one.key == SYSTEM), None)
+    own = matter[0 if systems is None else int(point[systems])]
+    firsts = (0 if one.options else one.span[0] for one in design.variable)
+    return tuple(
+        at if one.name in own else first for one, at, first in zip(design.variable, point, firsts, strict=True)
+    )
 
 
 def _chosen(design: Design, settings: list[tuple[str, Any]]) -> DesignSystem | None:
@@ -263,10 +280,3 @@ def _words(variable: VariableTable, value: Any) -> str:
     elif unit and unit[0] not in "°%":
         unit = f" {unit}"
     return (f"{value:g}" if isinstance(value, int | float) else str(value)) + unit
-
-
-def points(design: Design) -> Iterator[Point]:
-    """Every point of a design whose variables all have options."""
-    from itertools import product
-
-    yield from product(*(range(len(one.options)) for one in design.variable))

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from bim.model import Building, Space
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, Stage, silent
 from scenes.design.assessment import Assessment, assessed, in_order, on_front, outcome
-from scenes.design.candidates import Candidate, candidate, check_variables, value_of
+from scenes.design.candidates import Candidate, candidate, mattering, same_candidate, value_of
 from scenes.design.design_file import Design, VariableTable
 from scenes.design.search import METHODS, Axis, Outcome, Point, size
 from scenes.result_folder import SYSTEMS
@@ -29,6 +30,7 @@ from scenes.study.study_file import RoomTable, Study
 COMMAND = "design"
 OF_CLUSTER = 8  # candidates at a time with a scheduler
 NEARLY = 0.1  # sum of the shares of limits that are missed, up to which a candidate may meet them in full
+ROUNDS = 3  # in which more candidates are computed in full where none met all limits
 SEED_STEP = 1000  # between the seeds of repetitions
 SEARCH, FULL, REPEAT = "search", "full", "repeat"  # stages of a candidate
 Searched = Callable[..., None]  # as the functions of `METHODS`
@@ -86,7 +88,8 @@ class Evaluations:
     ) -> None:
         """Args: as of `run_design`."""
         self.design, self.store = design, store
-        self.folder = store.checkpoints(SYSTEMS)
+        self.folder = store.checkpoints(SYSTEMS).absolute()
+        self.matter = mattering(design, self.folder)
         self.plans: dict[tuple[str, ...], StudyPlan] = {}
         self.results: dict[str, CaseResult] = {}
         self.reused = 0
@@ -191,13 +194,20 @@ def run_design(
         progress=progress,
         on_candidate=on_candidate,
     )
-    check_variables(design, every.folder)
     searched = searched_candidates(design, every, search, OF_CLUSTER if scheduler else processes)
     if all(one.error for one in searched):
         raise DataError(f"no candidate can be computed; the first: {searched[0].error}")
     asked = design.search
-    chosen = [one.candidate.point for one in finalists(design, searched)]
-    full = every.assessments(FULL, chosen, quick=False)
+    full = every.assessments(FULL, [one.candidate.point for one in finalists(design, searched)], quick=False)
+    for _ in range(ROUNDS):
+        if any(one.feasible for one in full):
+            break
+        known = {one.candidate.point for one in full}
+        next_ones = [one.candidate.point for one in in_order(design, corrected(searched, full))]
+        left = [point for point in next_ones if point not in known][: asked.front]
+        if not left:
+            break
+        full += every.assessments(FULL, left, quick=False)
     ranked = in_order(design, full)
     if not ranked:
         raise DataError(f"no candidate of the front can be computed in full; the first: {full[0].error}")
@@ -238,7 +248,7 @@ def searched_candidates(
     method = search or METHODS[asked.method]
     if method is METHODS["all"] and not np.isfinite(size(space)):
         raise DataError('"all" needs `step` or `values` of every variable', field="search.method")
-    method(space, evaluate, asked.evaluations, asked.seed, batch)
+    method(space, evaluate, asked.evaluations, asked.seed, batch, partial(same_candidate, design, every.matter))
     return list(found.values())
 
 
@@ -257,6 +267,25 @@ def finalists(design: Design, searched: Sequence[Assessment]) -> list[Assessment
         if of_system and not any(one in chosen for one in of_system):
             chosen.append(of_system[0])
     return chosen
+
+
+def corrected(searched: Sequence[Assessment], full: Sequence[Assessment]) -> list[Assessment]:
+    """The candidates of the search with limited values as the full method would give them.
+
+    Each value moves by the median difference of the candidates that both have computed.
+    """
+    known = {one.candidate.point: one for one in full if not one.error}
+    pairs = [(one, known[one.candidate.point]) for one in searched if one.candidate.point in known and not one.error]
+    if not pairs:
+        return list(searched)
+    differences = [[b.value - a.value for a, b in zip(s.limits, f.limits, strict=True)] for s, f in pairs]
+    moved = np.median(np.array(differences), axis=0)
+    return [
+        replace(one, limits=tuple(replace(v, value=v.value + by) for v, by in zip(one.limits, moved, strict=True)))
+        if not one.error
+        else one
+        for one in searched
+    ]
 
 
 def design_manifest(result: DesignResult) -> dict[str, Any]:

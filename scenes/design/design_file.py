@@ -230,14 +230,16 @@ class Design(Study):
     def _named(cls, table: Any) -> Any:
         if not isinstance(table, dict):
             return table
-        variables = [dict(one) if isinstance(one, dict) else one for one in table.get("variable") or ()]
+        stated, systems = table.get("variable") or (), table.get("system") or ()
+        if not (isinstance(stated, list | tuple) and isinstance(systems, list | tuple)):
+            return table  # pydantic says what is wrong
+        variables = [dict(one) if isinstance(one, dict) else one for one in stated]
         for one in variables:
             if isinstance(one, dict) and not one.get("name") and isinstance(one.get("key"), str):
                 one["name"] = _words(one["key"])
-        systems = table.get("system") or ()
         chosen = any(isinstance(one, dict) and SYSTEM in _keys(one) for one in variables)
         if len(systems) > 1 and not chosen:
-            names = [one.get("name") if isinstance(one, dict) else one.name for one in systems]
+            names = [one.get("name") if isinstance(one, dict) else getattr(one, "name", "") for one in systems]
             variables.insert(0, {"name": SYSTEM, "key": SYSTEM, "values": names})
         return table | ({"variable": variables} if variables else {})
 

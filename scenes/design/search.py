@@ -30,6 +30,7 @@ MOST_CANDIDATES = 4000  # points whose expected improvement is computed for the 
 REFITTED = 1.15  # growth of the number of points after which the lengths are fitted again
 BEST = 10  # points near which others are looked for
 AUGMENTED = 0.05  # of the sum, beside the greatest of the weighted objectives
+TRIED = 50  # points at random for each one that is wanted
 FIRST = 2  # evaluations per variable before the first surrogate
 
 
@@ -77,6 +78,12 @@ class Outcome:
 
 # Outcomes of points in their order; None for one that cannot be computed
 Evaluate = Callable[[Sequence[Point]], Sequence[Outcome | None]]
+Same = Callable[[Point], Point]  # the one point that stands for all that are the same
+
+
+def itself(point: Point) -> Point:
+    """The point: no two are the same."""
+    return point
 
 
 def size(space: Space) -> float:
@@ -90,30 +97,34 @@ def every_point(space: Space) -> Iterator[Point]:
 
 
 def spread_points(space: Space, count: int, seed: int) -> list[Point]:
-    """Different points, evenly spread: a Latin hypercube."""
+    """Points, evenly spread: a Latin hypercube."""
     shares = qmc.LatinHypercube(len(space), rng=seed).random(count)
-    return list(dict.fromkeys(tuple(axis.sampled(u) for axis, u in zip(space, row, strict=True)) for row in shares))
+    return [tuple(axis.sampled(u) for axis, u in zip(space, row, strict=True)) for row in shares]
 
 
-def random_search(space: Space, evaluate: Evaluate, budget: int, seed: int, batch: int = 1) -> None:
-    """Points at random, each once."""
-    draw, seen = np.random.default_rng(seed), set[Point]()
-    most = min(budget, size(space))
-    while len(seen) < most:
-        fresh = {_random(space, draw): None for _ in range(batch)}
-        points = [point for point in fresh if point not in seen][: int(most) - len(seen)]
-        seen.update(points)
-        evaluate(points)
+def random_search(
+    space: Space, evaluate: Evaluate, budget: int, seed: int, batch: int = 1, same: Same = itself
+) -> None:
+    """Points at random, each once; fewer where they are hard to find."""
+    draw = np.random.default_rng(seed)
+    points: dict[Point, None] = {}
+    for _ in range(TRIED * budget):
+        points[same(_random(space, draw))] = None
+        if len(points) == budget:
+            break
+    ordered = list(points)
+    for start in range(0, len(ordered), batch):
+        evaluate(ordered[start : start + batch])
 
 
-def whole_grid(space: Space, evaluate: Evaluate, budget: int, seed: int, batch: int = 1) -> None:
+def whole_grid(space: Space, evaluate: Evaluate, budget: int, seed: int, batch: int = 1, same: Same = itself) -> None:
     """Every point; budget and seed do not matter."""
-    points = list(every_point(space))
+    points = list(dict.fromkeys(map(same, every_point(space))))
     for start in range(0, len(points), batch):
         evaluate(points[start : start + batch])
 
 
-def genetic(space: Space, evaluate: Evaluate, budget: int, seed: int, batch: int = 1) -> None:
+def genetic(space: Space, evaluate: Evaluate, budget: int, seed: int, batch: int = 1, same: Same = itself) -> None:
     """NSGA-II with mixed variables, of pymoo (Deb et al. 2002, doi:10.1109/4235.996017)."""
     from pymoo.algorithms.moo.nsga2 import RankAndCrowdingSurvival
     from pymoo.core.mixed import MixedVariableGA
@@ -129,7 +140,7 @@ def genetic(space: Space, evaluate: Evaluate, budget: int, seed: int, batch: int
             kinds[str(number)] = Integer(bounds=(0, axis.options - 1))
         else:
             kinds[str(number)] = Choice(options=list(range(axis.options)))
-    first = evaluate([tuple(axis.sampled(0.5) for axis in space)])[0]
+    first = evaluate([same(tuple(axis.sampled(0.5) for axis in space))])[0]
     if first is None:
         shape = (1, 0)
     else:
@@ -140,7 +151,7 @@ def genetic(space: Space, evaluate: Evaluate, budget: int, seed: int, batch: int
     bad = Outcome((1e9,) * shape[0], (1e9,) * shape[1])
     while algorithm.has_next():
         asked = algorithm.ask()
-        points = [tuple(one.X[str(number)] for number in range(len(space))) for one in asked]
+        points = [same(tuple(one.X[str(number)] for number in range(len(space)))) for one in asked]
         outcomes = [one or bad for one in evaluate(points)]
         asked.set("F", np.array([one.objectives for one in outcomes]))
         asked.set("G", np.array([one.limits for one in outcomes]).reshape(len(outcomes), shape[1]))
@@ -151,21 +162,25 @@ def genetic(space: Space, evaluate: Evaluate, budget: int, seed: int, batch: int
         algorithm.tell(infills=asked)
 
 
-def surrogate(space: Space, evaluate: Evaluate, budget: int, seed: int, batch: int = 1) -> None:
+def surrogate(space: Space, evaluate: Evaluate, budget: int, seed: int, batch: int = 1, same: Same = itself) -> None:
     """Expected improvement of a Gaussian process, see the module."""
     draw = np.random.default_rng(seed)
     most = int(min(budget, size(space)))
-    first = spread_points(space, min(most, max(FIRST * len(space) + 1, 6)), seed)
+    first = list(dict.fromkeys(map(same, spread_points(space, min(most, max(FIRST * len(space) + 1, 6)), seed))))
     outcomes: dict[Point, Outcome | None] = dict(zip(first, evaluate(first), strict=True))
     models = _Models(space, seed)
     while len(outcomes) < most:
         known = {point: one for point, one in outcomes.items() if one is not None}
         chosen: list[Point] = []
         for _ in range(min(batch, most - len(outcomes))):
-            point = _next(space, models, known, {*outcomes, *chosen}, draw)
+            point = _next(space, models, known, {*outcomes, *chosen}, draw, same)
+            if point is None:
+                break
             chosen.append(point)
             if len(known) > 1 and batch > 1:  # as if the evaluation gave what is expected of it
                 known[point] = models.expected(known, point)
+        if not chosen:  # every point is known
+            return
         outcomes.update(zip(chosen, evaluate(chosen), strict=True))
 
 
@@ -228,18 +243,20 @@ class _Models:
 
 
 def _next(
-    space: Space, models: _Models, known: dict[Point, Outcome], taken: set[Point], draw: np.random.Generator
-) -> Point:
-    """The point of greatest expected improvement among many."""
+    space: Space, models: _Models, known: dict[Point, Outcome], taken: set[Point], draw: np.random.Generator, same: Same
+) -> Point | None:
+    """The point of greatest expected improvement among many; None where no other is left."""
     points, outcomes = list(known), list(known.values())
     if len(known) < 2:
-        others = _others(space, points, taken, draw)
-        return others[int(draw.integers(len(others)))]
+        others = _others(space, points, taken, draw, same)
+        return others[int(draw.integers(len(others)))] if others else None
     objectives = np.array([one.objectives for one in outcomes])
     limits = np.array([one.limits for one in outcomes]).reshape(len(outcomes), -1)
     value, name = _one_objective(objectives, draw)
     order = np.lexsort((value, np.array([one.violation for one in outcomes])))
-    others = _others(space, [points[number] for number in order[:BEST]], taken, draw)
+    others = _others(space, [points[number] for number in order[:BEST]], taken, draw, same)
+    if not others:
+        return None
     met = (limits <= 0).all(axis=1)
     if not met.any():  # first the least that limits are missed by
         missed = np.maximum(limits, 0.0).sum(axis=1)
@@ -272,14 +289,16 @@ def _improvement(best: float, mean: FloatArray, deviation: FloatArray) -> FloatA
     return (best - mean) * ndtr(z) + safe * np.exp(-0.5 * z * z) / np.sqrt(2 * np.pi)
 
 
-def _others(space: Space, best: Sequence[Point], taken: set[Point], draw: np.random.Generator) -> list[Point]:
+def _others(
+    space: Space, best: Sequence[Point], taken: set[Point], draw: np.random.Generator, same: Same
+) -> list[Point]:
     """Points that were not evaluated: all of a small space, else at random and near the best."""
     if size(space) <= MOST_CANDIDATES:
-        return [point for point in every_point(space) if point not in taken]
+        return [point for point in dict.fromkeys(map(same, every_point(space))) if point not in taken]
     found = {_random(space, draw): None for _ in range(MOST_CANDIDATES // 2)}
     for number in range(MOST_CANDIDATES // 2 if best else 0):
         found[_neighbour(space, best[number % len(best)], draw)] = None
-    return [point for point in found if point not in taken] or [_random(space, draw)]
+    return [point for point in dict.fromkeys(map(same, found)) if point not in taken]
 
 
 def _neighbour(space: Space, point: Point, draw: np.random.Generator) -> Point:

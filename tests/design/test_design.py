@@ -13,6 +13,8 @@ from scenes.design.search import every_point
 from scenes.study.store import Store
 from tests.design.designs import COOLING, ENERGY, PLAIN, SEARCH, WIDTH, by_formula, design_file
 
+pytestmark = pytest.mark.early
+
 WARM = '[[constraint]]\nname = "warm hours"\nat_most = {}\n'
 
 
@@ -151,3 +153,19 @@ def test_cost_is_by_area_of_window_and_a_mean_of_cases(tmp_path):
     (one,) = every.assessments(module.SEARCH, [(0,)], quick=True)
     assert len(one.keys) == 2
     assert one.objectives[1] == pytest.approx(300 * 2.0 * 1.5)
+
+
+def test_where_the_cheap_method_is_too_kind_more_are_computed_in_full(tmp_path):
+    """In full there are 30 warm hours more: at most 60 h are met at 24.5 C, and not at 25 C."""
+
+    def kinder(case, *, progress=None):
+        result = by_formula(case)
+        result.figures["warm_h"] += 0 if case.options.heat_step_s == 3600.0 else 30
+        return result
+
+    search = SEARCH + 'method = "all"\nfront = 2\n'
+    narrow = WIDTH.replace("0.4", "1.2").replace("2.4", "1.3")
+    design = read_design(design_file(tmp_path, PLAIN, narrow, COOLING, ENERGY, WARM.format(60), search))
+    result = run_design(design, tmp_path / "out", compute=kinder)
+    assert result.best.feasible and result.best.candidate.label == "width 1.2 m, set point 24.5"
+    assert len(result.ranked) == 4  # two at 25 C, and two after the correction

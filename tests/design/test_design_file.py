@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from mitsuba_cfs.errors import DataError
 from scenes.cli import run
 from scenes.demo import OFFICE
-from scenes.design.candidates import candidate, check_variables
+from scenes.design.candidates import candidate, mattering, same_candidate
+from scenes.design.design import SEARCH as SEARCH_STAGE
+from scenes.design.design import Evaluations, space_of
 from scenes.design.design_file import read_design
+from scenes.design.search import Outcome, surrogate
 from scenes.fenestration.systems import read_system
 from scenes.room.operation import read_operation
+from scenes.study.store import Store
 from scenes.toml_file import read_table
-from tests.design.designs import BLIND, COOLING, ENERGY, PLAIN, RULE, TILT, WIDTH, design_file
+from tests.design.designs import BLIND, COOLING, ENERGY, PLAIN, RULE, TILT, WIDTH, by_formula, design_file
+
+pytestmark = pytest.mark.early
 
 BOX_KEY = '[[variable]]\nkey = "room.box.window.{}"\nvalues = [1.0, 2.0]\n'
 WRONG = {
@@ -75,7 +83,7 @@ def test_a_wrong_file_is_one_line_that_names_the_key(tmp_path, capsys, body, wor
 def test_a_key_that_there_is_not_is_named_before_the_search(tmp_path, variable, words):
     design = read_design(design_file(tmp_path, PLAIN, variable, ENERGY))
     with pytest.raises(DataError) as caught:
-        check_variables(design, tmp_path)
+        mattering(design, tmp_path)
     assert words in str(caught.value)
 
 
@@ -83,7 +91,7 @@ def test_a_building_has_no_box_to_shape(tmp_path):
     room = f'[[room]]\nname = "office"\nbuilding = "{OFFICE}"\n'
     design = read_design(design_file(tmp_path, PLAIN, WIDTH, ENERGY, room=room))
     with pytest.raises(DataError, match=r"room\.box\.window\.width"):
-        check_variables(design, tmp_path)
+        mattering(design, tmp_path)
 
 
 def test_values_are_those_of_the_study(tmp_path):
@@ -158,3 +166,29 @@ def test_a_blind_is_traced_once_and_indoors_it_is_behind_the_panes(tmp_path):
         visible = read_system(path).visible
         glancing += sign * visible.direct_hemispherical(visible.reflection_front)[117:133].mean()
     assert glancing > 0.05
+
+
+def test_points_that_are_one_candidate_are_searched_once(tmp_path):
+    design = read_design(design_file(tmp_path, PLAIN, BLIND, TILT, RULE, ENERGY))
+    matter = mattering(design, tmp_path)
+    assert matter == ({"system"}, {"system", "tilt", "rule"})
+    every = {same_candidate(design, matter, (system, t, r)) for system in (0, 1) for t in (0, 1) for r in (0, 1)}
+    assert every == {(0, 0, 0), (1, 0, 0), (1, 0, 1), (1, 1, 0), (1, 1, 1)}
+    found = []
+    surrogate(
+        space_of(design),
+        lambda points: found.extend(points) or [Outcome((float(sum(p)),)) for p in points],
+        20,
+        1,
+        1,
+        lambda point: same_candidate(design, matter, point),
+    )
+    assert sorted(found) == sorted(every)
+
+
+def test_systems_of_a_folder_by_a_relative_path_are_found(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    design = read_design(design_file(tmp_path, BLIND, TILT, ENERGY))
+    every = Evaluations(design, Store(Path("out"), command="design"), compute=by_formula)
+    (one,) = every.assessments(SEARCH_STAGE, [(0,)], quick=True)
+    assert not one.error

@@ -9,6 +9,8 @@ import pytest
 
 from scenes.design.search import METHODS, Axis, Outcome, every_point, genetic, random_search, size, surrogate
 
+pytestmark = pytest.mark.early
+
 STEPS = tuple(np.linspace(0, 1, 10))
 SPACE = (Axis(10, scale=STEPS), Axis(10, scale=STEPS), Axis(10, scale=STEPS))  # 1,000 points
 
