@@ -46,6 +46,13 @@ def api_text(package: str, modules: list[str]) -> str:
     return "\n".join([top, *(f"::: {module}\n" for module in modules)])
 
 
+# Pages that the search of the site shows after those for users: evidence, decisions, internals
+LATER_IN_SEARCH = re.compile(
+    r"adr/|source/|evidence_|(architecture|benchmarks|capabilities|reliability|validation|CHANGELOG|CONTRIBUTING)\.md|"
+    r"api/\w+\.\w+.*\.md"
+)
+
+
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """Put the API pages behind the guide's."""
     pages = [{name: f"api/{name}.md"} for name, modules in api_pages().items() if modules]
@@ -78,6 +85,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """The page's links, from its place in the site instead of that in the repository."""
     here = page.file.src_uri
+    if LATER_IN_SEARCH.match(here):
+        page.meta.setdefault("search", {"boost": 0.2})
     if here.startswith(("api/", "source/")):
         return markdown
     source = {name: path for path, name in PAGES.items()}.get(here, f"docs/{here}")

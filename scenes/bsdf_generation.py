@@ -50,21 +50,21 @@ def generated_file(
     fabrics: Path | None = None,
     fabric: str | None = None,
     spectrum: Path | None = None,
-    colour: str | None = None,
+    sheet_colour: str | None = None,
     progress: Progress = silent,
     **options,
 ) -> tuple[BsdfFile, str, SlatLight | None]:
     """The layer's BSDF file (Visible and Solar), how exact it is in words, and its light by wavelength.
 
-    Args: spectrum: CSV file of the sheets' reflectance; colour: "#rrggbb" instead.  None: grey.
+    Args: spectrum: CSV file of the sheets' reflectance; sheet_colour: "#rrggbb" instead.  None: grey.
     """
     reflectance = None
-    if spectrum is not None or colour is not None:
+    if spectrum is not None or sheet_colour is not None:
         if options["shape"] not in SHEETS or tensor_tree is not None or basis != "full":
-            raise click.UsageError(f"--spectrum and --colour need --shape {', '.join(SHEETS)} and --basis full")
-        if spectrum is not None and colour is not None:
-            raise click.UsageError("--spectrum and --colour exclude each other")
-        reflectance = _sheet_reflectance(spectrum, colour, options["visible"])
+            raise click.UsageError(f"--spectrum and --sheet-colour need --shape {', '.join(SHEETS)} and --basis full")
+        if spectrum is not None and sheet_colour is not None:
+            raise click.UsageError("--spectrum and --sheet-colour exclude each other")
+        reflectance = _sheet_reflectance(spectrum, sheet_colour, options["visible"])
         options["visible"] = float(visible_mean(reflectance))
     if options["shape"] == "fabric":
         if tensor_tree is not None:
@@ -145,7 +145,7 @@ def _sheet_reflectance(spectrum: Path | None, colour: str | None, visible: float
     except DataError:
         raise
     except ValueError as error:
-        raise click.UsageError(f"--{error}") from None
+        raise click.UsageError(f"--sheet-{error}") from None
     return shape if visible is None else with_visible(shape[None], np.array([visible]))[0]
 
 

@@ -122,6 +122,18 @@ def result_titles(study: Mapping[str, Any]) -> dict[str, str]:
     return {f"{kind}-{name}": one["name"] for kind in ("report", "rules") for one, name in named}
 
 
+def _made_by(name: str, journal: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """The line of the last command that made a folder of results."""
+    out = f"{RESULTS}/{name}"
+    return next((one for one in reversed(journal) if one.get("state") == "done" and out in one["command"]), None)
+
+
+def preview(name: str, journal: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether a folder of results was made with `--quick`."""
+    line = _made_by(name, journal)
+    return line is not None and "--quick" in line["command"]
+
+
 def outdated(project: Project, name: str, journal: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
     """What has changed since a folder of results was made: input files, "choices" of the page.
 
@@ -130,8 +142,7 @@ def outdated(project: Project, name: str, journal: Sequence[Mapping[str, Any]]) 
         journal: the lines of `Project.journal`; nothing is known of results whose command is not in it.
     """
     out = f"{RESULTS}/{name}"
-    made = (one for one in reversed(journal) if one.get("state") == "done" and out in one["command"])
-    line = next(made, None)
+    line = _made_by(name, journal)
     if line is None:
         return ()
     command = [str(part) for part in line["command"]]

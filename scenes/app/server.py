@@ -352,6 +352,7 @@ class AppServer:
         journal = self._project.journal()
         for result in results:
             result["outdated"] = actions.outdated(self._project, result["name"], journal)
+            result["quick"] = actions.preview(result["name"], journal)
             result["title"] = _result_title(result["name"], titles)
             pages = [result["pages"].get(name) for name in ("report", "dossier")]
             result["answers"] = [text for page in pages if page for text in answers(self._project.folder / page)]

@@ -264,7 +264,7 @@ def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> Non
 @click.option("--visible", type=SHARE, help="Visible reflectance (Radiance plastic).")
 @click.option("--solar", type=SHARE, help="Solar reflectance; default: the visible one.")
 @click.option("--spectrum", type=FILE, help="CSV file of the sheets' reflectance: wavelength_nm, reflectance.")
-@click.option("--colour", metavar="#RRGGBB", help="Colour of the sheets (sRGB), in place of --spectrum.")
+@click.option("--sheet-colour", metavar="#RRGGBB", help="Colour of the sheets (sRGB), in place of --spectrum.")
 @click.option("--specular", type=SHARE, default=0.0, help="Specular reflectance (Radiance plastic).")
 @click.option("--roughness", type=Number(min=0), default=0.0, help="Roughness of the specular part (Radiance plastic).")
 @basis_option
@@ -288,7 +288,7 @@ def generate(out: Path, **options) -> None:
 
     check_file(out, inputs=[options[name] for name in ("geometry", "product", "fabrics", "spectrum")])
     of_slats = out.with_name(f"{out.stem}_slats.csv")
-    if options["spectrum"] is not None or options["colour"] is not None:
+    if options["spectrum"] is not None or options["sheet_colour"] is not None:
         check_file(of_slats, inputs=[options["spectrum"]])
     with ProgressBar() as progress:
         file, exact, slats = generated_file(progress=progress, **options)

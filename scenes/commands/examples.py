@@ -64,7 +64,7 @@ EXAMPLES = {
     "bsdf generate": (
         "cfs bsdf generate --tilt-deg 45 --depth-mm 80 --spacing-mm 72 --out slats.xml",
         "cfs bsdf generate --shape perforated --openness 0.1 --out sheet.xml",
-        "cfs bsdf generate --depth-mm 80 --spacing-mm 72 --colour '#b04a3a' --out red.xml",
+        "cfs bsdf generate --depth-mm 80 --spacing-mm 72 --sheet-colour '#b04a3a' --out red.xml",
     ),
     "bsdf library": (
         "cfs bsdf library",

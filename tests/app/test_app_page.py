@@ -84,6 +84,8 @@ def test_the_building_is_seen_and_a_room_is_chosen_in_the_view(browser, served) 
 
 def test_a_fix_by_a_flag_is_told_as_one_of_the_command_line(browser) -> None:
     """The page has no button for it; rooms keep their words whole where the table scrolls."""
+    go(browser, "building")
+    browser.until("document.querySelector('#room-rows td') !== null")
     told = browser.value(
         "import('/app/building.js').then((module) => ['--join makes one', 'draw it', ''].map(module.remedy))"
     )
@@ -252,6 +254,7 @@ def test_results_of_older_inputs_and_a_damaged_file_are_told(tmp_path) -> None:
             go(page, "results")
             cards = page.value("[...document.querySelectorAll('#folders .card')].map((e) => e.innerText)")
             (report,) = [text for text in cards if "report-glazing" in text]
+            assert "preview" in report  # its command had --quick
             assert "out of date" in report and "office.ifc" in report and "Meets it." in report
             best = page.value("[...document.querySelectorAll('#variants .best')].map((e) => e.innerText)")
             assert best == ["82", "12"]

@@ -213,11 +213,11 @@ def test_coloured_slats_pass_in_each_band_what_slats_of_that_reflectance_pass(va
 @pytest.mark.parametrize(
     "options, message",
     [
-        ("--colour red", "expected #rrggbb"),
-        ("--colour #aa3311 --basis quarter", "need --shape"),
-        ("--colour #aa3311 --tensor-tree 3", "need --shape"),
-        ("--colour #aa3311 --shape prism", "need --shape"),
-        ("--colour #aa3311 --spectrum paint.csv", "exclude each other"),
+        ("--sheet-colour red", "expected #rrggbb"),
+        ("--sheet-colour #aa3311 --basis quarter", "need --shape"),
+        ("--sheet-colour #aa3311 --tensor-tree 3", "need --shape"),
+        ("--sheet-colour #aa3311 --shape prism", "need --shape"),
+        ("--sheet-colour #aa3311 --spectrum paint.csv", "exclude each other"),
     ],
 )
 def test_colours_that_cannot_be_are_refused(tmp_path, monkeypatch, options, message):

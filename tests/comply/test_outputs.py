@@ -40,6 +40,7 @@ from scenes.demo import OFFICE, WEATHER
 from scenes.input_files import InputFiles, read_building, read_weather
 from scenes.page_options import PageOptions
 from scenes.result_folder import ResultFolder
+from tests.devtools import Page, chromium
 
 HEAD = """
 title = "View and sun"
@@ -138,6 +139,17 @@ def test_the_dossier_says_all(result):
     ):
         assert wanted in html
     assert "<script" not in html and "http:" not in html.replace("http://www.w3.org", "")
+
+
+@pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
+def test_a_long_address_among_the_sources_does_not_widen_a_phones_page(result, tmp_path):
+    rule = result.rules["rays"].model_copy(update={"source": ["example.org/" + 60 * "x"]})
+    (tmp_path / "dossier.html").write_text(dossier_html(replace(result, rules={"rays": rule})), "utf-8")
+    with Page(tmp_path, width=390, height=800) as page:
+        size = {"width": 390, "height": 800, "deviceScaleFactor": 1, "mobile": False}
+        page.send("Emulation.setDeviceMetricsOverride", **size)
+        page.open((tmp_path / "dossier.html").as_uri(), ready="document.readyState === 'complete'")
+        assert page.value("document.documentElement.scrollWidth") <= 390
 
 
 def test_the_dossier_begins_with_its_answers(result):

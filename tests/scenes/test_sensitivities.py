@@ -55,7 +55,7 @@ def of(table: pd.DataFrame, name: str, figure: str) -> pd.Series:
 
 def test_every_input_of_the_room_has_its_figures(year):
     table = year.sensitivities
-    assert set(table["input"]) == set(INPUTS) - {"reflectance_furniture", "tilt_deg"}
+    assert set(table["input"]) == set(INPUTS) - {"reflectance_furniture", "tilt_deg", "tracing"}
     assert np.isfinite(table.select_dtypes(float)).all(axis=None)
     light = table[table["figure"] == "mean_illuminance_lx"]
     assert (light["derivative"] > 0).all() and (light["standard_error"] > 0).all()
@@ -140,5 +140,5 @@ def test_a_window_of_another_u(resistance):
 def test_path_tracing_has_no_sensitivities():
     from scenes.room.options import RoomOptions
 
-    with pytest.raises(ValueError, match="sensitivities need"):
+    with pytest.raises(ValueError, match="sensitivities and bands need"):
         RoomOptions.of(sensitivities=True, method="point-in-time")

@@ -24,7 +24,7 @@ from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import FenestrationSystem
 
 REFLECTANCE = {"floor": 0.2, "wall": 0.5, "ceiling": 0.7}
-STEPS = {"floor": 0.05, "wall": 0.05, "ceiling": 0.05, "ground": 0.05, "u": 0.1}
+STEPS = {"floor": 0.05, "wall": 0.05, "ceiling": 0.05, "ground": 0.01, "u": 0.1}
 KEYS = {
     "floor": "reflectance_floor",
     "wall": "reflectance_walls",

@@ -62,6 +62,7 @@ function drawFolders() {
   byId("no-results").hidden = results.length > 0;
   fill(byId("folders"), results.map((result) => h("li", { class: "card" },
     h("h3", {}, kindOf(result.name), result.title ? `: ${result.title}` : ""), h("p", { class: "soft" }, `results/${result.name}, ${when.format(result.time * 1000)}`),
+    result.quick ? h("p", {}, h("span", { class: "chip warning" }, gettext("preview")), " ", gettext("Few rays, coarse grid. Compute again with reliable accuracy before you decide.")) : null,
     outdated(result),
     result.answers.length ? h("ul", { class: "answers" }, result.answers.map((text) => h("li", {}, text))) : null,
     h("p", { class: "links" }, Object.entries(result.pages).map(([key, path], i) => h("a", { href: page.link(path), target: "_blank", rel: "noopener", class: i ? "" : "main", ...(path.endsWith(".csv") ? { download: true } : {}) }, names[key]))),
