@@ -95,7 +95,8 @@ def in_order(design: Design, every: Sequence[Assessment]) -> list[Assessment]:
 
     Limits come first: those that meet all, then by the sum of the shares that they are missed by.
     Among those that meet all, candidates that no other surpasses in every objective come first, and
-    among these the least weighted sum of the shares by which objectives are worse than the best.
+    among these the least weighted sum of the shares by which objectives are worse than the best: of
+    the best value, or of the range of the front where that is greater.
     """
     done = [one for one in every if not one.error]
     if not done:
@@ -106,7 +107,7 @@ def in_order(design: Design, every: Sequence[Assessment]) -> list[Assessment]:
     front = signed[usable][ranks == 0]
     low, high = front.min(axis=0), front.max(axis=0)
     weights = np.array([o.weight for o in design.objective])
-    shares = (signed - low) / np.where(high > low, high - low, np.maximum(np.abs(low), 1e-9))
+    shares = (signed - low) / np.maximum(np.maximum(np.abs(low), high - low), 1e-9)
     score = shares @ (weights / weights.sum())
     rank = np.full(len(done), len(done))
     rank[usable] = ranks
