@@ -30,7 +30,7 @@ WRONG = {
     "no such objective": (PLAIN + WIDTH + '[[objective]]\nname = "energie"\n', "did you mean 'energy'?"),
     "column without a goal": (PLAIN + WIDTH + '[[objective]]\ncolumn = "warm_h"\n', 'goal: a column needs "least"'),
     "no such rule": (PLAIN + WIDTH + ENERGY + '[[constraint]]\nrule = "en17037 glair"\n', "en17037 has no 'glair'"),
-    "no such standard": (PLAIN + WIDTH + ENERGY + '[[constraint]]\nrule = "en1 glare"\n', "no rule 'en1'"),
+    "no such standard": (PLAIN + WIDTH + ENERGY + '[[constraint]]\nrule = "standard9 glare"\n', "no rule 'standard9'"),
     "no such level": (
         PLAIN + WIDTH + ENERGY + '[[constraint]]\nrule = "en17037 glare"\nlevel = "best"\n',
         "has no 'best'; it has minimum, medium, high",

@@ -193,6 +193,7 @@ def test_true_colour_and_melanopic_map(page, run) -> None:
             pen = "document.querySelector('#one .eye').getContext('2d')"
             red, green, blue, _ = page.value(f"Array.from({pen}.getImageData({x}, {y}, 1, 1).data)")
             assert red > green > blue
+            assert page.value("document.getElementById('scale').offsetParent === null")  # of false colours
     # a surface without sun: 0.5 of its own times 0.8 of the light; a window: 1.2
     found = "cfs.explorer.found[0]"
     ratio = f"(i) => cfs.melanopic({found}, {found}.tints)[i] / {found}.values[i]"
@@ -204,6 +205,7 @@ def test_true_colour_and_melanopic_map(page, run) -> None:
     plane = page.value(f"Array.from({found}.melanopic)")
     assert plane == pytest.approx((0.9 * explored.illuminance[0][:, number]).tolist(), rel=2e-3, abs=0.01)
     assert "lx melanopic EDI at the eye" in _text(page, "#one .figures")
+    assert _text(page, "#high-end").endswith("cd/m², melanopic EDL")
 
 
 def test_patches_of_sun_have_their_true_edges(page, run) -> None:

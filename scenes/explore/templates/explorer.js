@@ -157,8 +157,10 @@
     const { colours, high, palette } = look(), box = byId("scale");
     box.hidden = colours === "seen" || colours === "true";
     byId("bar").style.background = cfs.gradient(palette);
-    byId("low-end").textContent = `${cfs.number(high / 1000, 2)} cd/m²`;
-    byId("high-end").textContent = `${cfs.number(high, 2)} cd/m²`;
+    for (const [end, value] of [["low-end", high / 1000], ["high-end", high]]) {
+      const number = cfs.number(value, 2);
+      byId(end).textContent = colours === "melanopic" ? gettext("{value} cd/m², melanopic EDL", { value: number }) : `${number} cd/m²`;
+    }
     for (const bar of document.querySelectorAll(".lux-bar")) bar.style.background = cfs.gradient(palette);
     const ratios = Array.from({ length: 9 }, (_, i) => `rgb(${cfs.ratioColour(cfs.MOST_RATIO ** ((i - 4) / 4)).join()})`);
     byId("ratio-bar").style.background = `linear-gradient(90deg,${ratios.join(",")})`;
