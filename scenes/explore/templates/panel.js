@@ -3,6 +3,8 @@
   "use strict";
   const { gettext, ngettext, fixed } = cfs;
   const TEMPERATURES = [["operative", gettext("operative"), "--operative"], ["air", gettext("air"), "--air"], ["outdoor", gettext("outdoors"), "--outdoor"]];
+  const LEAST_SUN = 1; // [lx] of direct sun on a level plane that is shown
+  const levelSun = (found, sun) => found.room.arrays.sun_lux[found.l] * Math.max(sun[2], 0); // [lx]
 
   class Panel {
     // root: its element; variants: [{label, which room where there are several, room (a promise), state}]
@@ -64,7 +66,8 @@
       const beams = shining ? room.beams(state, found.l) : [];
       this.asMelanopic = look.colours === "melanopic" && Boolean(found.melanopic);
       this.at("quantity").textContent = this.asMelanopic ? gettext("Melanopic EDI of the work plane") : gettext("Illuminance of the work plane");
-      this.drawing.paint((this.asMelanopic ? found.melanopic : found.lux) || null, shining ? { direction: sun, groups: beams, planes: look.planes } : null);
+      const seen = beams.filter((beam) => levelSun(found, sun) * beam.through >= LEAST_SUN);
+      this.drawing.paint((this.asMelanopic ? found.melanopic : found.lux) || null, shining ? { direction: sun, groups: seen, planes: look.planes } : null);
       this.sayLight(found, beams, sun);
       this.sayHeat(room, hour, day);
     }
@@ -94,14 +97,14 @@
     }
 
     sayLight(found, beams, sun) {
-      const { lux, room } = found;
+      const { lux } = found;
       if (!lux) { this.at("light").textContent = "\u00a0"; return; }
       const sorted = Array.from(lux).sort((a, b) => a - b), middle = sorted[sorted.length >> 1];
       let text = gettext("Work plane: median {median} lx, {least} to {most} lx.", {
         median: cfs.number(middle), least: cfs.number(sorted[0]), most: cfs.number(sorted.at(-1)),
       });
-      const most = Math.max(0, ...beams.map((b) => b.through)), direct = room.arrays.sun_lux[found.l] * Math.max(sun[2], 0) * most;
-      if (direct >= 1) text += " " + gettext("Sun patches reach {lux} lx.", { lux: cfs.number(direct, 2) });
+      const direct = levelSun(found, sun) * Math.max(0, ...beams.map((b) => b.through));
+      if (direct >= LEAST_SUN) text += " " + gettext("Sun patches reach {lux} lx.", { lux: cfs.number(direct, 2) });
       else if (beams.length) text += " " + gettext("No direct sun is transmitted.");
       this.at("light").textContent = text;
     }
