@@ -174,6 +174,21 @@ def test_the_dossier_begins_with_its_answers(result):
     assert '<p class="preview" role="note">Quick run' in quick and quick.count("Quick run:") == 1
 
 
+def test_an_answer_that_was_not_computed_says_why(result):
+    rule = result.rules["rays"].model_copy(update={"weather": ("Rostock",)})
+    rooms = [
+        replace(
+            room,
+            verdicts=tuple(replace(one, values=tuple((None,) * len(v) for v in one.values)) for one in room.verdicts),
+        )
+        for room in result.rooms
+    ]
+    unknown = [replace(one, values=(None,) * len(one.values), met=(None,) * len(one.met)) for one in result.verdicts]
+    lost = replace(result, rules={"rays": rule}, rooms=tuple(rooms), verdicts=tuple(unknown))
+    for text in dict(answers(lost)).values():
+        assert text == "Not computed. It asks for the weather of Rostock."
+
+
 def test_a_dossier_with_a_title_and_without_its_rooms(result):
     options = PageOptions(title="Ours", author="A", left_out=("rooms", "sources"))
     html = dossier_html(result, page=options)

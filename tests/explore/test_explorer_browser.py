@@ -226,7 +226,7 @@ def test_patches_of_sun_have_their_true_edges(page, run) -> None:
     wrong = (np.array(shown) > 127) != reached
     assert wrong.sum() <= 4, "more than the pixels that an edge crosses"
     # a closed blind passes next to nothing of the beam: no patch, as the words say
-    page.value("(() => { cfs.explorer.found[0].room.arrays.through.fill(1e-7); hour.dispatchEvent(new Event('input')); })()")
+    page.value("cfs.explorer.found[0].room.arrays.through.fill(1e-7) && hour.dispatchEvent(new Event('input'))")
     page.until("document.querySelector('#one .light').textContent.includes('No direct sun')")
     assert page.value("!cfs.explorer.panels[0].drawing.lit.data.some((one, i) => i % 4 === 3 && one > 0)")
 
