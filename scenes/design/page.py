@@ -180,11 +180,9 @@ class TradeOff:
 
 def trade_offs(result: DesignResult) -> tuple[TradeOff, ...]:
     """Charts of the first objective with each other one, or with the limits where it is alone."""
-    first, *others = result.design.objective
-    pairs = [(first, number) for number in range(1, len(others) + 1)]
-    if others:
-        return tuple(_chart(result, number) for _, number in pairs)
-    return tuple(_chart(result, 1 + number, limit=True) for number in range(len(result.best.limits)))
+    others = len(result.design.objective) - 1
+    count = others or len(result.best.limits)
+    return tuple(_chart(result, number, limit=not others) for number in range(1, count + 1))
 
 
 def _chart(result: DesignResult, number: int, *, limit: bool = False) -> TradeOff:

@@ -490,11 +490,11 @@ def heat_sensitivities(
     tables: list[list[pd.DataFrame]] = [[] for _ in rooms]
     for key in heat_inputs(rooms):
         step = STEP_SHARE * INPUTS[key].deviation
-        if key in ("g_value", "u_value"):
-            moved_ones = [room for room in rooms if room.fenestration]
-        else:
-            moved_ones = list(rooms)
-        ends = [figures([moved_room(r, key, by) if r in moved_ones else r for r in rooms]) for by in (step, -step)]
+        of_windows = key in ("g_value", "u_value")
+        ends = [
+            figures([r if of_windows and not r.fenestration else moved_room(r, key, by) for r in rooms])
+            for by in (step, -step)
+        ]
         for table, room, value, up, down in zip(tables, rooms, base, *ends, strict=True):
             of_figures = [(name, value[name], (up[name] - down[name]) / (2 * step), 0.0) for name in value]
             table.append(sensitivity_table(key, input_value(room, key), of_figures))

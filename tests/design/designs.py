@@ -18,13 +18,7 @@ PLAIN = f"""
 name = "Glazing"
 bsdf = "{GLAZING}"
 """
-BLIND = """
-[[system]]
-name = "Blind"
-cost = 300
-[system.blind]
-paths = 256
-[[system.layers]]
+PANES = """[[system.layers]]
 thickness = 0.004
 visible = [0.90, 0.08, 0.08]
 solar = [0.84, 0.075, 0.075]
@@ -35,6 +29,13 @@ visible = [0.88, 0.05, 0.055]
 solar = [0.62, 0.27, 0.20]
 emissivity = [0.03, 0.84]
 """
+BLIND = f"""
+[[system]]
+name = "Blind"
+cost = 300
+[system.blind]
+paths = 256
+{PANES}"""
 TILT = """
 [[variable]]
 key = "system.blind.tilt_deg"

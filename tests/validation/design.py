@@ -29,11 +29,13 @@ from scenes.design.design import SEARCH, Evaluations, searched_candidates, space
 from scenes.design.design_file import Design, read_design
 from scenes.design.search import METHODS, Axis, Evaluate, Outcome, Point, Same, Space, every_point, itself
 from scenes.study.store import Store
+from tests.design.designs import PANES
 
 SHARE = 0.1  # of the points of a grid, that a search may take at most
 NEAR = 1.0  # [%] of the grid's best
 PENALTY = 10.0  # of the limits that are missed, for CMA-ES, which has none
-ROOM = """
+ROOM = (
+    """
 title = "Tilt, reflectance, irradiance"
 glare = "none"
 methods = ["three-phase"]
@@ -64,17 +66,9 @@ name = "Blind"
 [system.blind]
 slat_radius = 0.104
 paths = 1024
-[[system.layers]]
-thickness = 0.004
-visible = [0.90, 0.08, 0.08]
-solar = [0.84, 0.075, 0.075]
-gap = { width = 0.016, gas = { argon = 0.9, air = 0.1 } }
-[[system.layers]]
-thickness = 0.004
-visible = [0.88, 0.05, 0.055]
-solar = [0.62, 0.27, 0.20]
-emissivity = [0.03, 0.84]
-[[objective]]
+"""
+    + PANES
+    + """[[objective]]
 name = "energy"
 [[constraint]]
 name = "warm hours"
@@ -90,6 +84,7 @@ name = "irradiance"
 key = "operation.control.close_above"
 values = [50, 150, 250, 350, 450]
 """
+)
 OPERATION = """
 [control]
 rule = "irradiance"

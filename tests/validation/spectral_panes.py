@@ -1,4 +1,4 @@
-"""Direct light of an overcast sky through panes by wavelength: Radiance, its own rays by quadrature, and ours."""
+"""Overcast light through panes by wavelength: Radiance, its own rays by quadrature, and mitsuba-cfs."""
 
 from __future__ import annotations
 
