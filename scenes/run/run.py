@@ -6,7 +6,7 @@ import platform
 import time
 import weakref
 from collections import Counter
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
@@ -36,11 +36,14 @@ from scenes.inputs import Inputs, read_inputs
 from scenes.language.catalogue import N_
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult, method_figures, method_notes
+from scenes.room.control_groups import same_control
 from scenes.room.heat import DaylitRoom, coupled_years
 from scenes.room.inputs import skies_for
+from scenes.room.operation import SharedYear
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import RoomChoices, compute_room, lit_room
 from scenes.room.series import RoomSeries, moved_light, moved_result
+from scenes.room.shared_states import with_shared_states
 from scenes.run.first_plan import FROM, OnPlan, first_plan, options_for_error
 from scenes.run.options import JobOptions
 from scenes.run.together import RoomsTogether
@@ -74,6 +77,21 @@ def computed_rooms(
     """
     coupled = balanced_together(inputs, options)
     spaces = run_spaces(inputs, options)
+    inputs = replace(
+        inputs,
+        operation=with_shared_states(
+            inputs.operation,
+            inputs.building,
+            spaces,
+            inputs.systems,
+            inputs.weather,
+            options.room,
+            skies=skies,
+            cache=MatrixCache.of_user() if options.cache else None,
+            inner=options.inner_glass,
+            progress=progress,
+        ),
+    )
     store = StoredArrays() if len(spaces) > 1 else None
     with scratch_folder() as folder:
         equal = template_rooms(spaces)
@@ -138,12 +156,8 @@ def _interchangeable(inputs: Inputs, options: JobOptions, one: Space, other: Spa
         return False  # their light depends on their neighbours
     if any(model_grids(building, room) for room in rooms):
         return False
-    if operation is not None:
-        tables = [operation.tables.of_room(building, room) for room in rooms]
-        if tables[0] != tables[1] or any(group.windows for group in tables[0].control.group):
-            return False  # other values, or a rule for windows of one of them
-        if tables[0].control.is_random:
-            return False  # other people
+    if not same_control(None if operation is None else operation.tables, building, one, other):
+        return False
     if options.colour and not same_hues(one, other):
         return False
     if not balanced_together(inputs, options):
@@ -207,7 +221,7 @@ class RoomWork:
         here = workers.scheduler is None
         run = "" if here else _identity(self.options, self.inputs)
         together = self.together.for_processes()
-        compute = _Here(replace(self, together=together)) if here else _FromFiles(self.with_heat, self.options, run)
+        compute = _Here(replace(self, together=together)) if here else self._from_files(run)
         left = Counter(together.set_of(guid) for guid in rooms)
         tasks = Tasks(
             list(rooms),
@@ -224,6 +238,10 @@ class RoomWork:
                 left[number] -= 1
                 if not left[number]:
                     together.remove(number)
+
+    def _from_files(self, run: str) -> _FromFiles:
+        operation = self.inputs.operation
+        return _FromFiles(self.with_heat, self.options, run, {} if operation is None else operation.shared)
 
     def of(self, guid: str) -> RoomYear | DaylitRoom:
         """The result of the room with a GUID."""
@@ -251,10 +269,13 @@ class _FromFiles:
     with_heat: bool
     options: JobOptions
     run: str  # `_identity` of the run
+    shared: Mapping[str, SharedYear]  # states of groups of several rooms
 
     def __call__(self, guid: str) -> tuple[str, RoomYear | DaylitRoom]:
         variants.activate()
         inputs, together, spaces, skies = _read(self.options, self.run)
+        if inputs.operation is not None:
+            inputs = replace(inputs, operation=replace(inputs.operation, shared=self.shared))
         work = RoomWork(inputs, spaces, skies, self.options, together, with_heat=self.with_heat)
         return guid, work.of(guid)
 
