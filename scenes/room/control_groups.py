@@ -220,13 +220,13 @@ def _shared_group(building: Building, name: str, members: Sequence[tuple[Space, 
         for space, other, n in members
     }
     seats = [point for leaf in rule.leaves for point in (leaf.seat, leaf.at) if point is not None]
-    if named:
-        sensors = tuple(dict.fromkeys(building.room(one).space.guid for one in named))
-        for guid in sensors:
-            if guid not in windows:
-                message = f"has no windows of the group {name!r}"
-                raise DataError(message, element=building.space(guid).label, field=f"{place}.sensor_rooms")
-        chosen = tuple(space for space, _, _ in members if space.guid in sensors)
+    guids = {building.room(one).space.guid for one in named}
+    others = guids - windows.keys()
+    if others and place != "control":  # what [control] names counts for the groups that have windows there
+        message = f"has no windows of the group {name!r}"
+        raise DataError(message, element=building.space(min(others)).label, field=f"{place}.sensor_rooms")
+    if guids & windows.keys():
+        chosen = tuple(space for space, _, _ in members if space.guid in guids)
     elif seats:
         chosen = tuple(s for s, _, _ in members if all(in_room(s, np.array([seat]))[0] for seat in seats))
         if not chosen:

@@ -21,7 +21,7 @@ def stored_groups(building: Building, tables: OperationTables, file: Path) -> li
     """
     groups: list[StoredGroup] = []
     shared: dict[str, int] = {}
-    shared_groups(building, tables)  # refuses groups that cannot move together
+    of_building = {group.name: group for group in shared_groups(building, tables)}
     for space in building.spaces:
         of_room = tables.of_room(building, space)
         control = control_groups(space, of_room.control, building)
@@ -42,8 +42,8 @@ def stored_groups(building: Building, tables: OperationTables, file: Path) -> li
             if of_several:
                 shared[of_several] = len(groups)
                 stated["across"] = "building"
-                rooms = [building.room(one).space.guid for one in control.sensor_rooms[c]]
-                stated |= {"sensor_rooms": rooms} if rooms else {}
+                rooms = [room.guid for room in of_building[of_several].sensor_rooms]
+                stated |= {"sensor_rooms": rooms} if len(rooms) < len(of_building[of_several].windows) else {}
             groups.append(StoredGroup(of_several or name, windows, stated, "" if of_several else space.label))
     return groups
 

@@ -14,7 +14,11 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bim.doorways import panes_between, source_rooms
+from bim.energyplus_twin import EnergyPlusTwin, TwinAir
 from bim.model import Space
 from bim.report.issue import Issue, issue_note
 from bim.sensors import model_grids
@@ -31,19 +35,21 @@ from mitsuba_cfs.source_code import code_version
 from mitsuba_cfs.stored_arrays import PassedArrays, StoredArrays
 from scenes.cluster import Requirements
 from scenes.head import Head
+from scenes.heat.energyplus import twin_of_rooms
 from scenes.input_files import InputFiles
 from scenes.inputs import Inputs, read_inputs
 from scenes.language.catalogue import N_
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult, method_figures, method_notes
 from scenes.room.control_groups import same_control
-from scenes.room.heat import DaylitRoom, coupled_years
+from scenes.room.heat import DaylitRoom, OnZones, coupled_years
 from scenes.room.inputs import skies_for
 from scenes.room.operation import SharedYear
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import RoomChoices, compute_room, lit_room
 from scenes.room.series import RoomSeries, moved_light, moved_result
 from scenes.room.shared_states import with_shared_states
+from scenes.room.zone import RoomZone
 from scenes.run.first_plan import FROM, OnPlan, first_plan, options_for_error
 from scenes.run.options import JobOptions
 from scenes.run.together import RoomsTogether
@@ -69,6 +75,7 @@ def computed_rooms(
     *,
     on_room: OnRoom | None = None,
     on_light: OnLight | None = None,
+    on_zones: OnZones | None = None,
     workers: Workers | None = None,
 ) -> tuple[Sequence[RoomYear], list[Issue], list[str]]:
     """The years of the rooms in their order, issues of rooms left out, notes.
@@ -127,6 +134,7 @@ def computed_rooms(
             progress,
             store=store,
             seed=options.room.sampling.seed,
+            on_zones=on_zones,
         )
         variants.return_memory()
         notes += coupling if len(years) > 1 else []
@@ -137,8 +145,8 @@ def computed_rooms(
 
 
 def balanced_together(inputs: Inputs, options: JobOptions) -> bool:
-    """Whether heat flows between the rooms of a run."""
-    return options.coupled_heat and len(inputs.spaces) > 1
+    """Whether the heat of a run's rooms is balanced after the light of all: it flows between them."""
+    return options.coupled_heat and (len(inputs.spaces) > 1 or options.energyplus)
 
 
 def run_spaces(inputs: Inputs, options: JobOptions) -> Sequence[Space]:
@@ -377,8 +385,23 @@ def run_inputs(
     room = options.room
     skies = skies_for(weather, room.sampling, **room.sky)
     progress("sky", 1.0)
+    twins: list[EnergyPlusTwin] = []
+
+    def twin(zones: Sequence[RoomZone], links: NDArray[np.float64]) -> None:
+        terrain = (OperationTables() if inputs.operation is None else inputs.operation.tables).terrain
+        of = inputs.building, zones, inputs.systems, weather
+        steps = round(3600.0 / room.heat_step_s)
+        twins.append(twin_of_rooms(*of, air=TwinAir(links), terrain=terrain, steps=steps))
+
     results, issues, notes = computed_rooms(
-        inputs, skies, options, progress, on_room=on_room, on_light=on_light, workers=workers
+        inputs,
+        skies,
+        options,
+        progress,
+        on_room=on_room,
+        on_light=on_light,
+        on_zones=twin if options.energyplus else None,
+        workers=workers,
     )
     if not results:
         raise DataError("none of its rooms could be computed", file=options.building)
@@ -392,6 +415,7 @@ def run_inputs(
         *method_notes(map(method_figures, results)),
         *(result.borrowed for result in results if result.borrowed),
         *map(issue_note, leaks),
+        *(f"model.epJSON: {note}." for one in twins for note in one.notes),
     ]
     return RunResult(
         building,
@@ -403,6 +427,7 @@ def run_inputs(
         tuple(dict.fromkeys(notes)),
         room.method,
         head,
+        twins[0] if twins else None,
     )
 
 
