@@ -40,7 +40,7 @@ def with_shared_states(
     """The operation with the states of the groups that several rooms share, among them some `spaces`.
 
     Each sensor room follows the rule of a group by itself; the group takes the most closed of these
-    states, and then waits as its rule says. Rooms with windows in one state alone ask for nothing.
+    states, and then waits as its rule says. Rooms with windows of a single state do not count.
 
     Args: systems: also of the windows of sensor rooms; the others as of `lit_room`.
 

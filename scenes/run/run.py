@@ -35,13 +35,13 @@ from mitsuba_cfs.source_code import code_version
 from mitsuba_cfs.stored_arrays import PassedArrays, StoredArrays
 from scenes.cluster import Requirements
 from scenes.head import Head
-from scenes.heat.energyplus import twin_of_rooms
 from scenes.input_files import InputFiles
 from scenes.inputs import Inputs, read_inputs
 from scenes.language.catalogue import N_
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult, method_figures, method_notes
 from scenes.room.control_groups import same_control
+from scenes.room.energyplus import twin_of_rooms
 from scenes.room.heat import DaylitRoom, OnZones, coupled_years
 from scenes.room.inputs import skies_for
 from scenes.room.operation import SharedYear
