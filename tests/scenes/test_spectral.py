@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -107,7 +108,7 @@ def test_run_writes_tables_and_names_systems_without_a_spectrum(tmp_path) -> Non
 def test_spectrum_of_panes_and_shade(blind) -> None:
     factor = read_system(blind).spectrum
     assert isinstance(factor, SpectralFactor)
-    blue, _, red = factor.of_patches(channels_of(3)).whole[:, 0]
+    blue, _, red = factor.of_patches(channels_of(3)).straight[:, 0]
     assert blue == 0 and red > 1
     assert read_system(VENETIAN_BLIND).spectrum is None
 
@@ -130,20 +131,22 @@ def test_faults_of_a_spectrum(tmp_path, text: str, message: str) -> None:
 
 
 def test_a_file_of_coloured_slats_is_read_as_it_was_written_and_faults_are_named(tmp_path) -> None:
-    straight = np.linspace(0.0, 0.4, 145)
-    light = SlatLight(straight, straight[:, None] + np.interp(NANOMETRES, [380, 780], [0.1, 0.5]))
-    path = tmp_path / "slats.csv"
+    shares = np.linspace(0.0, 0.5, 2 * 145**2).reshape(2, 145, 145)
+    light = SlatLight(np.interp(NANOMETRES, [380, 780], [0.1, 0.5]), shares)
+    path = tmp_path / "slats.json"
     write_slat_light(light, path)
     found = SpectralTable(slats=path).factor()
-    assert found.slats.whole == pytest.approx(light.whole, abs=1e-4)
-    assert found.slats.straight == pytest.approx(straight, abs=1e-5) and found.mirrored is None
-    rows = path.read_text("utf-8").splitlines()
-    for lines, message in (
-        (rows[:-1], "a row for each of 145 patches"),
-        ([rows[0].replace("380", "381"), *rows[1:]], "expected the columns patch, straight, 380"),
-        ([rows[0], rows[1].replace("1,0,", "1,-0.1,", 1), *rows[2:]], "from 0 to 1"),
+    assert found.slats.shares == pytest.approx(shares, abs=1e-4)
+    assert found.slats.reflectance == pytest.approx(light.reflectance, abs=1e-5) and found.mirrored is None
+    text = path.read_text("utf-8")
+    for fault, message in (
+        (text.replace("380.0", "381.0", 1), "every 10 nm from 380 to 780"),
+        (text.replace('"reflectance":[0.1', '"reflectance":[-0.1', 1), "from 0 to 1"),
+        (json.dumps({**json.loads(text), "shares": shares[:, :, :3].tolist()}), "expected 145 x 145 patches"),
+        ("{}", "expected numbers of wavelength_nm, reflectance, shares"),
+        ("patch,straight", "is not JSON"),
     ):
-        path.write_text("\n".join(lines), "utf-8")
+        path.write_text(fault, "utf-8")
         with pytest.raises(DataError, match=message):
             SpectralTable(slats=path).factor()
     with pytest.raises(ValueError, match="expected shade or slats, got both"):
@@ -212,7 +215,7 @@ def test_layers_without_a_spectrum_are_named_and_a_stated_spectrum_goes_before(b
     whole = state_of(VENETIAN_BLIND, pane | gap, pane)
     # the amber fabric beside the blind's file is not lost by layers that do not know it
     beside = state_of(blind, pane | gap, plain)
-    assert beside.spectrum is not None and beside.spectrum.of_angles(channels_of(3))[0, 0] == 0
+    assert beside.spectrum is not None and beside.spectrum.of_angles(channels_of(3))[0, 0, 0] == 0
     for states, count in (((partial,), 1), ((whole, beside), 0)):
         room = SimpleNamespace(windows=SimpleNamespace(systems=[states]))
         light = SimpleNamespace(light=SimpleNamespace(systems=[states]))
