@@ -94,6 +94,17 @@ class SpectralFactor:
         visible: Array = visible_mean(self.transmittance)
         return visible
 
+    @staticmethod
+    def of_diffuse_light(factors: Sequence[SpectralFactor], amounts: Sequence[float]) -> SpectralFactor:
+        """That of the mean diffuse light of several systems, at all angles.
+
+        Args: amounts: of visible light that each passes.
+        """
+        weight = np.sin(2 * ANGLES)
+        spectra = [weight @ one.transmittance for one in factors]
+        parts = [amount * spectrum / visible_mean(spectrum) for amount, spectrum in zip(amounts, spectra, strict=True)]
+        return SpectralFactor(np.tile(np.sum(parts, axis=0), (len(ANGLES), 1)))
+
     def of_angles(self, channels: Channels) -> Array:
         """r_c at `ANGLES` [1 + n, C, A]: of light that passes straight on, that slats reflect 1, 2, .. times."""
         ratio: Array = _relative(channels.mean(self.transmittance), self.visible[:, None]).T

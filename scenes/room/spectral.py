@@ -14,7 +14,6 @@ from mitsuba_cfs.bsdf.spectral_factor import ANGLES, SpectralFactor
 from mitsuba_cfs.images.hdr import LUMINANCE_WEIGHTS
 from mitsuba_cfs.images.view import pixel_directions
 from mitsuba_cfs.methods.colour_view import rgb_over_luminance
-from mitsuba_cfs.methods.optics import SystemOptics
 from mitsuba_cfs.methods.spectral_light import Detection, SpectralLight, sky_spectra, spectral_light
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.picture_year.year import PictureYear
@@ -275,10 +274,15 @@ def _factors(room: RoomInputs, light: RoomLight) -> tuple[list[list[SpectralFact
                     )
                 )
     factors = [[known[id(system)] for system in states] for states in room.windows.systems]
-    inner: Sequence[Sequence[SystemOptics]] = light.light.systems[len(factors) :]
-    if inner:
-        notes.append(Note("Glass between rooms transmits all wavelengths equally."))
-    factors += [[SpectralFactor.neutral() for _ in states] for states in inner]
+    if light.inner is not None:
+        notes.append(
+            Note(
+                "Room {room}: daylight through glass between rooms has the colour of the other room's windows; that "
+                "glass and the surfaces of the other room count as neutral.",
+                room=room.space.label,
+            )
+        )
+        factors += [[one] for one in light.inner.spectra]
     return factors, notes
 
 

@@ -31,7 +31,7 @@ from scenes.room.operation import read_operation, read_state
 from scenes.room.options import RoomOptions
 from scenes.room.room import inputs_of_room
 from scenes.room.spectral import _factors, room_spectral
-from scenes.room.surface_spectra import SurfaceTable, ground_reflectance, room_reflectance
+from scenes.room.surface_spectra import SurfaceTable, ground_reflectance, materials, room_reflectance
 from scenes.room.windows import in_all_windows
 from tests.scenes.test_tilts import family
 
@@ -170,7 +170,7 @@ def test_a_spectrum_that_is_no_number_is_refused(tmp_path) -> None:
 def test_tilts_between_systems_are_not_noted_beside_these() -> None:
     states = tilt_states(family(), 10.0)
     room = SimpleNamespace(windows=SimpleNamespace(systems=[states]))
-    light = SimpleNamespace(light=SimpleNamespace(systems=[states]))
+    light = SimpleNamespace(light=SimpleNamespace(systems=[states]), inner=None)
     factors, notes = _factors(room, light)
     assert len(factors[0]) == len(states) == 8
     assert [note.split(":")[0] for note in notes] == ["milk 0", "milk 40", "milk 70"]
@@ -218,7 +218,7 @@ def test_layers_without_a_spectrum_are_named_and_a_stated_spectrum_goes_before(b
     assert beside.spectrum is not None and beside.spectrum.of_angles(channels_of(3))[0, 0, 0] == 0
     for states, count in (((partial,), 1), ((whole, beside), 0)):
         room = SimpleNamespace(windows=SimpleNamespace(systems=[states]))
-        light = SimpleNamespace(light=SimpleNamespace(systems=[states]))
+        light = SimpleNamespace(light=SimpleNamespace(systems=[states]), inner=None)
         notes = _factors(room, light)[1]
         assert len(notes) == count
         assert all("other layers transmit all wavelengths equally" in note for note in notes)
@@ -266,10 +266,22 @@ def test_colours_of_surfaces_are_those_stated_then_those_of_the_model(tmp_path) 
     assert ground_reflectance((*tables, lawn)) == pytest.approx(lawn.shape()) and ground_reflectance(tables) is None
 
 
+def test_materials_have_their_measured_spectra() -> None:
+    """Shapes that other libraries show too: green at 550 nm, red edge of leaves beyond 700 nm, red clay."""
+    at = {name: np.interp([450.0, 550.0, 650.0, 750.0], NANOMETRES, rho) for name, rho in materials().items()}
+    assert len(at) == 8 and all(0 < values.min() and values.max() < 0.6 for values in at.values())
+    blue, green, red, edge = at["vegetation"]
+    assert green > 2 * max(blue, red) and edge > 4 * green
+    assert at["clay tile"][2] > 3 * at["clay tile"][0] and at["asphalt"][2] < 1.5 * at["asphalt"][0]
+    table = SurfaceTable(select="ground", material="sand")
+    assert ground_reflectance((table,)) == pytest.approx(materials()["sand"])
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('[[surface]]\nselect = "floor"\n', "expected spectrum or colour"),
+        ('[[surface]]\nselect = "floor"\n', "expected spectrum, colour or material"),
+        ('[[surface]]\nselect = "ground"\nmaterial = "grass"\n', "expected one of asphalt, concrete, .*, got 'grass'"),
         ('[[surface]]\nselect = "floor"\ncolour = "red"\n', "expected #rrggbb"),
         ('[[surface]]\nselect = "floor"\nspectrum = "none.csv"\n', "no such file: none.csv"),
         ('[[surface]]\nselect = "floor"\nspectrum = "bad.csv"\n', "from 380 to 780 nm"),
