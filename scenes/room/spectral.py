@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bim.colours import GREY
 from bim.rays import ray_mesh
 from mitsuba_cfs.bsdf.spectral_factor import ANGLES, SpectralFactor
 from mitsuba_cfs.images.hdr import LUMINANCE_WEIGHTS
@@ -109,7 +110,21 @@ def _light(
         ground=ground_reflectance(tables),
         progress=progress,
     )
-    return spectral, [*notes, *of_surfaces]
+    return spectral, [*notes, *of_surfaces, *_outdoors(room)]
+
+
+def _outdoors(room: RoomInputs) -> list[Note]:
+    """That the colours of surfaces outdoors are not used, where there are any."""
+    count = sum(element.hue != GREY for element in room.building.elements)
+    if not count:
+        return []
+    return [
+        Note(
+            "Room {room}: surfaces outdoors with a colour in the model ({count}) reflect all wavelengths equally.",
+            room=room.space.label,
+            count=count,
+        )
+    ]
 
 
 @dataclass(frozen=True, slots=True)
