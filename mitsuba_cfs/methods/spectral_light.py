@@ -225,7 +225,7 @@ class _Season:
         for room in rooms:
             groups = [
                 [
-                    _GroupInState(light, lit[g][j], g, self._angles[g][j], room, beam, of_slats.get((g, j)))
+                    _GroupInState(light, lit[g][j], g, self._angles[g][j], room, beam, of_slats=of_slats.get((g, j)))
                     for j, beam in zip(traced_states(states), room.beams[g], strict=True)
                 ]
                 for g, states in enumerate(light.systems)
@@ -399,6 +399,7 @@ class _GroupInState:
         angles: _Angles,
         room: RoomInBand,
         beam: Array | None,
+        *,
         of_slats: Array | None,
     ) -> None:
         matrices, coefficients = room.matrices, one.coefficients

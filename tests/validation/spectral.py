@@ -184,7 +184,7 @@ def _compared(own: Light, peers: Light, s: int) -> str:
         f"{own.ratio[s]:.4f}",
         _difference(100 * own.ratio[s] / ratio.mean(), 100 * ratio / ratio.mean(), 2),
         _difference(own.kelvin[s], kelvin, 0),
-        f"{mired:+.1f}",
+        f"{mired:+.1f}" if np.isfinite(mired) else "none",
         f"{apart:.4f}",
     )
     return " | ".join(cells)
@@ -192,6 +192,8 @@ def _compared(own: Light, peers: Light, s: int) -> str:
 
 def _difference(own: float, peers: NDArray[np.float64], digits: int) -> str:
     """A difference from the mean, and the mean's standard error."""
+    if not np.isfinite(own - peers.mean()):
+        return "none"
     difference = f"{own - peers.mean():+.{digits}f}"
     if len(peers) == 1:
         return difference
