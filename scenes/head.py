@@ -158,7 +158,38 @@ def head_of(
         *system_notes(used, light_only=light_only),
         *([] if weather is None else [*weather.notes, *site_notes(building, weather)]),
     ]
-    return Head(model_lines(building), building.issues, _once(assumed), model_notes(building))
+    issues = issues_of(building, spaces)
+    elsewhere = len(building.issues) - len(issues)
+    others = [
+        Note(
+            "{count} problems of rooms that are not computed are not listed: cfs check lists them",
+            "{count} problem of rooms that are not computed is not listed: cfs check lists it",
+            count=elsewhere,
+        )
+    ]
+    model = (*model_lines(building), *(others if elsewhere else ()))
+    return Head(model, issues, _once(assumed), model_notes(building, issues))
+
+
+def issues_of(building: Building, spaces: Sequence[Space] = ()) -> tuple[Issue, ...]:
+    """The issues that concern these rooms or the whole model: not those of the other rooms alone.
+
+    Args: spaces: all where empty.
+    """
+    chosen = {space.guid for space in spaces or building.spaces}
+    used = {guid for space in building.spaces if space.guid in chosen for guid in _guids(space)}
+    others = {guid for space in building.spaces if space.guid not in chosen for guid in _guids(space)} - used
+    return tuple(issue for issue in building.issues if issue.where not in others)
+
+
+def _guids(space: Space) -> Iterable[str]:
+    """A room, its windows and the building elements that bound it."""
+    yield space.guid
+    for window in space.windows:
+        yield window.guid
+    for face in space.faces:
+        if face.element is not None:
+            yield face.element
 
 
 def model_lines(building: Building) -> tuple[str, ...]:
@@ -210,11 +241,11 @@ def _with_glass(line: Note, area: float) -> Note:
     return Note("{line} ({area:.2f} m2 of glass)", line=line, area=area) if area else line
 
 
-def model_notes(building: Building) -> tuple[str, ...]:
+def model_notes(building: Building, issues: Iterable[Issue]) -> tuple[str, ...]:
     """Why the model cannot be used, what was joined, and what no result depends on."""
     account = building.account
     verdict = account.lines[:1] if account is not None and account.verdict == NOT_USABLE else ()
-    issues = (issue for issue in building.issues if issue.severity == "unused" or issue.code in NOTED)
+    issues = (issue for issue in issues if issue.severity == "unused" or issue.code in NOTED)
     return (*verdict, *map(issue_note, issues))
 
 

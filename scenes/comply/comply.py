@@ -321,7 +321,7 @@ def check_rooms(
         tuple(check.assumptions(rooms, left_out(spaces, glazed, dark))),
         check.head,
         tuple(dict.fromkeys(notes)),
-        (*building.issues, *view_issues, *issues),
+        (*check.head.issues, *view_issues, *issues),
         check.seconds,
     )
 

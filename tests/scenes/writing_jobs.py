@@ -130,6 +130,7 @@ JOBS = {
     "export --gltf": Job(lambda _, out: ["export", OFFICE, "--gltf", out], "out.glb"),
     "ifc templates": to_folder("ifc", "templates"),
     "ifc bonsai": Job(lambda _, out: ["ifc", "bonsai", "--out", out], "out.zip"),
+    "ifc info": Job(lambda _, out: ["ifc", "info", OFFICE, "--json", out], "out.json"),
     "ifc survey": Job(lambda _, out: ["ifc", "survey", OFFICE, "--markdown", out], "out.md"),
     "bsdf plot": Job(lambda _, out: ["bsdf", "plot", VENETIAN_BLIND, "--incident", 40, 0, "--out", out], "out.png"),
     "bsdf thermal": Job(lambda _, out: ["bsdf", "thermal", VENETIAN_BLIND, "--out", out], "out.csv"),
