@@ -48,6 +48,8 @@ EXAMPLES = {
     ),
     "design": ("cfs design design.toml --out design",),
     "pv": ("cfs pv house.ifc --weather city.epw --study modules.toml --out yield",),
+    "site neighbours": ("cfs site neighbours next-door.ifc --weather city.epw --proposed tower.glb --out site",),
+    "site reflections": ("cfs site reflections house.ifc --weather city.epw --points street.csv --out site",),
     "calibrate": ("cfs calibrate",),
     "ifc attach": (
         "cfs ifc attach house.ifc --facade S --bsdf blind.xml --u 1.1 --g 0.25 -o out.ifc",

@@ -111,6 +111,12 @@ JOBS = {
         "out.ifc",
     ),
     "pv": to_folder("pv", OFFICE, "--weather", WEATHER, "--study", PV_STUDY),
+    "site neighbours": to_folder(
+        "site", "neighbours", OFFICE, "--weather", WEATHER, "--proposed", REPOSITORY / "tests/site/tower.obj"
+    ),
+    "site reflections": to_folder(
+        "site", "reflections", OFFICE, "--weather", WEATHER, "--points", REPOSITORY / "tests/site/street.csv"
+    ),
     "dgp": to_folder("dgp"),
     "explore": Job(lambda inputs, out: ["explore", _explorer(inputs), "--out", out], folder=True),
     "study": Job(_study, folder=True),
