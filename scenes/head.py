@@ -293,13 +293,22 @@ def site_notes(building: Building, weather: Weather) -> tuple[str, ...]:
     if max(abs(north), abs(east)) <= FAR_SITE_DEG:
         return ()
     note = Note(
-        "The site of the building ({north:.1f} N, {east:.1f} E) is far from the weather station "
-        "{station} ({station_north:.1f} N, {station_east:.1f} E); the solar positions are those of "
-        "the weather station.",
-        north=building.latitude_deg,
-        east=building.longitude_deg,
+        "The site of the building ({building}) is far from the weather station {station} ({position}); "
+        "the solar positions are those of the weather station.",
+        building=_position(building.latitude_deg, building.longitude_deg),
         station=weather.site,
-        station_north=weather.latitude_deg,
-        station_east=weather.longitude_deg,
+        position=_position(weather.latitude_deg, weather.longitude_deg),
     )
     return (note,)
+
+
+def _position(latitude_deg: float, longitude_deg: float) -> Note:
+    """Latitude and longitude in words."""
+    north, east = abs(float(latitude_deg)), abs(float(longitude_deg))
+    if latitude_deg >= 0 and longitude_deg >= 0:
+        return Note("{north:.1f}° N, {east:.1f}° E", north=north, east=east)
+    if latitude_deg >= 0:
+        return Note("{north:.1f}° N, {east:.1f}° W", north=north, east=east)
+    if longitude_deg >= 0:
+        return Note("{north:.1f}° S, {east:.1f}° E", north=north, east=east)
+    return Note("{north:.1f}° S, {east:.1f}° W", north=north, east=east)
