@@ -179,7 +179,19 @@ def issues_of(building: Building, spaces: Sequence[Space] = ()) -> tuple[Issue, 
     chosen = {space.guid for space in spaces or building.spaces}
     used = {guid for space in building.spaces if space.guid in chosen for guid in _guids(space)}
     others = {guid for space in building.spaces if space.guid not in chosen for guid in _guids(space)} - used
-    return tuple(issue for issue in building.issues if issue.where not in others)
+    labels = {space.label: space.guid in chosen for space in building.spaces}
+    return tuple(
+        issue
+        for issue in building.issues
+        if issue.where not in others and _names_one(issue.values.get("rooms"), labels)
+    )
+
+
+def _names_one(rooms: object, chosen: Mapping[str, bool]) -> bool:
+    """Whether rooms that an issue names by their labels are chosen ones in part; True where it names none."""
+    if not isinstance(rooms, tuple) or not rooms or not all(room in chosen for room in rooms):
+        return True
+    return any(chosen[room] for room in rooms)
 
 
 def _guids(space: Space) -> Iterable[str]:

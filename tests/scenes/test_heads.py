@@ -294,6 +294,9 @@ def test_a_head_names_no_problem_of_a_room_that_is_not_computed():
     kept = {issue.where for issue in issues_of(building, [south])}
     assert shared
     assert kept == {*wheres} - {east.guid, east.windows[0].guid}
+    pair = Issue("rooms-joined-by-size", "opening", {"rooms": (east.label,), "area": 4.0, "limit": 3.0})
+    assert issues_of(replace(building, issues=(pair,)), [south]) == ()
+    assert issues_of(replace(building, issues=(pair,)), [east]) == (pair,)
     lines = head_of(building, [south]).lines
     assert "2 problems of rooms that are not computed are not listed: cfs check lists them" in lines
     assert {issue.where for issue in head_of(building).issues} == {*wheres}
