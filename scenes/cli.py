@@ -81,6 +81,7 @@ COMMANDS = {
     "thermal": "Compute hourly gains, temperatures, loads and comfort of rooms (heat only).",
     "study": "Compare rooms, systems, orientations and climates of a study file.",
     "design": "Search the best system, sizes and rule of control for a room.",
+    "fit": "Fit inputs of a model to measured light or temperatures.",
     "pv": "Compute the yield of the photovoltaic modules of a building.",
     "calibrate": "Measure the computing time of each method on this machine.",
 }

@@ -17,7 +17,7 @@ Source: restricted likelihood of correlated errors: Harville 1977, doi:10.1080/0
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -56,6 +56,7 @@ class Prior:
     deviation: Array  # [p]
     low: Array  # [p]
     high: Array  # [p]
+    linear: NDArray[np.bool_]  # [p] in which the model is linear: no reason to compute derivatives again
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,7 +78,7 @@ class Estimate:
     low: Array  # [p] ends of the 95 % interval, within the bounds
     high: Array
     modelled: Array  # [N] at `value`
-    derivatives: Array  # [N, p] at `value`
+    expanded_at: Array  # [p] near `value`, where the derivatives were computed
     noise: dict[str, Noise]  # by group
     steps: int
     converged: bool
@@ -87,6 +88,12 @@ class Estimate:
         """Of each parameter [p]."""
         error: Array = np.sqrt(np.diag(self.covariance))
         return error
+
+    def of_first(self, count: int) -> Estimate:
+        """The estimate of the first parameters."""
+        part = slice(count)
+        values = {key: getattr(self, key)[part] for key in ("value", "low", "high", "expanded_at")}
+        return replace(self, covariance=self.covariance[part, part], **values)
 
 
 class Model(Protocol):
@@ -113,31 +120,36 @@ def estimate(
     theta = np.clip(prior.mean, prior.low, prior.high)
     values, slopes, of_slopes = model.values(theta), model.derivatives(theta), theta
     whitener, done = _Whitener(readings), False
-    moved = np.inf
+    moved, log_noise = np.inf, None
     steps = 0
     while not (done and moved <= NEAR) and steps < MOST_STEPS:
         steps += 1
         report(steps / MOST_STEPS)
-        moved = float(np.max(np.abs(theta - of_slopes) / prior.deviation))
+        moved = _moved(theta, of_slopes, prior)
         if moved > (NEAR if done else FAR):
             slopes, of_slopes = model.derivatives(theta), theta
         whitener.scale_by(values)
-        log_noise = _likeliest_noise(whitener, values, slopes, theta, prior)
+        log_noise = _likeliest_noise(whitener, values, slopes, theta, prior, log_noise)
         wanted = _solved(whitener, log_noise, values, slopes, theta, prior)
         error = np.sqrt(np.diag(_covariance(whitener, log_noise, slopes, prior)))
         done = bool(np.all(np.abs(wanted - theta) <= CLOSE * error))
         if not done:
             theta, values = _stepped(model, whitener, log_noise, theta, values, wanted, prior)
-        moved = float(np.max(np.abs(theta - of_slopes) / prior.deviation))
+        moved = _moved(theta, of_slopes, prior)
     whitener.scale_by(values)
-    log_noise = _likeliest_noise(whitener, values, slopes, theta, prior)
+    log_noise = _likeliest_noise(whitener, values, slopes, theta, prior, log_noise)
     noise = whitener.noise(log_noise)
     free = max(sum(one.effective for one in noise.values()) - len(theta), LEAST_FREEDOM)
     widened = (student.ppf(0.975, free) / NORMAL) ** 2
     covariance = _covariance(whitener, log_noise, slopes, prior, widened)
     half = NORMAL * np.sqrt(np.diag(covariance))
     low, high = np.maximum(theta - half, prior.low), np.minimum(theta + half, prior.high)
-    return Estimate(theta, covariance, low, high, values, slopes, noise, steps, done and moved <= NEAR)
+    return Estimate(theta, covariance, low, high, values, of_slopes, noise, steps, done and moved <= NEAR)
+
+
+def _moved(theta: Array, other: Array, prior: Prior) -> float:
+    """The farthest that a parameter in which the model is not linear has moved [prior deviations]."""
+    return float(np.max((np.abs(theta - other) / prior.deviation)[~prior.linear], initial=0.0))
 
 
 def _stepped(
@@ -216,8 +228,13 @@ class _Whitener:
         return found
 
 
-def _likeliest_noise(w: _Whitener, values: Array, slopes: Array, theta: Array, prior: Prior) -> Array:
-    """ln sigma, ln tau of each group [2 G] that maximise the marginal likelihood of the linear model."""
+def _likeliest_noise(
+    w: _Whitener, values: Array, slopes: Array, theta: Array, prior: Prior, known: Array | None
+) -> Array:
+    """ln sigma, ln tau of each group [2 G] that maximise the marginal likelihood of the linear model.
+
+    Args: known: of the step before, where the search begins; None: it begins at several correlations.
+    """
     spread = slopes * prior.deviation
     residual = w.y - values - slopes @ (prior.mean - theta)
 
@@ -235,12 +252,12 @@ def _likeliest_noise(w: _Whitener, values: Array, slopes: Array, theta: Array, p
         limits += [(size - 12.0, size + 5.0), (low, high)]
         first.append((size, [np.log(0.1 * step), np.log(3 * step), 0.5 * (np.log(3 * step) + high)]))
     least, likeliest = np.inf, np.zeros(2 * len(w.groups))
-    for start in range(3):
-        x0 = np.array([value for size, taus in first for value in (size, taus[start])])
+    starts = [np.array([value for size, taus in first for value in (size, taus[n])]) for n in range(3)]
+    for x0 in starts if known is None else [known]:
         x0 = np.clip(x0, [low for low, _ in limits], [high for _, high in limits])
         found = minimize(minus_log, x0, method="L-BFGS-B", bounds=limits)
         if found.fun < least - 1e-6:
-            least, likeliest = float(found.fun), found.x
+            least, likeliest = float(found.fun), np.asarray(found.x, dtype=np.float64)
     return likeliest
 
 

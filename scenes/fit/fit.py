@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import json_text, write_table, write_text
 from mitsuba_cfs.progress import Progress, silent
-from scenes.fit.estimate import Estimate, Prior, estimate
+from scenes.fit.estimate import Estimate, estimate
 from scenes.fit.fit_file import LEAST_READINGS, LIGHT, Fit
 from scenes.fit.model import KELVIN_NOISE, LIGHT_NOISE, FittedModel
 from scenes.head import Head
@@ -81,8 +81,7 @@ def run_fit(fit: Fit, *, progress: Progress = silent, model: FittedModel | None 
     if sum(len(one.values) for one in readings) < LEAST_READINGS + len(fit.mean):
         count = LEAST_READINGS + len(fit.mean)
         raise DataError(f"expected at least {count} readings for {len(fit.mean)} parameters", file=fit.file)
-    prior = Prior(fit.mean, fit.deviation, fit.low, fit.high)
-    found = estimate(model, readings, prior, lambda share: progress("fit", share))
+    found = estimate(model, readings, model.prior(), lambda share: progress("fit", share)).of_first(len(fit.mean))
     comparison = _comparison(model, found)
     coverage = {}
     for name, part in (("fitted", comparison[comparison.fitted]), ("predicted", comparison[~comparison.fitted])):
@@ -121,16 +120,18 @@ def _parameters(fit: Fit, found: Estimate, correlations: pd.DataFrame) -> pd.Dat
 
 def _comparison(model: FittedModel, found: Estimate) -> pd.DataFrame:
     """Each reading beside the fitted model, with the 90 % interval of a single reading."""
-    whole, slopes = model.whole(found.value), model.whole_derivatives(found.value)
+    whole, slopes = model.whole(found.value), model.whole_derivatives(found.expanded_at)
     variance = np.einsum("np,pq,nq->n", slopes, found.covariance, slopes)
-    tables, first = [], 0
+    tables: list[pd.DataFrame] = []
+    first = 0
     for (one, steps, values), fitted in zip(model.columns, model.fitted(), strict=True):
         rows = slice(first, first + len(steps))
         first += len(steps)
         light = one.quantity in LIGHT
         noise = found.noise[LIGHT_NOISE if light else KELVIN_NOISE].deviation
         scale = np.abs(whole[rows]) if light else np.ones(len(steps))
-        half = BAND * np.sqrt(variance[rows] + (noise * scale) ** 2)
+        traced = model.tracing_error.get(len(tables), 0.0)
+        half = BAND * np.sqrt(variance[rows] + (noise**2 + traced**2) * scale**2)
         tables.append(
             pd.DataFrame(
                 {
@@ -148,11 +149,11 @@ def _comparison(model: FittedModel, found: Estimate) -> pd.DataFrame:
     return pd.concat(tables, ignore_index=True)
 
 
-def write_fit(result: FitResult, folder: ResultFolder, pages: Sequence[Any] = ()) -> None:
-    """Write all files of a fit in the place of earlier ones; pages: functions of the folder."""
+def write_fit(result: FitResult, folder: ResultFolder, page: Callable[[Path], None] | None = None) -> None:
+    """Write all files of a fit in the place of earlier ones; page: writes its report into a folder."""
     with folder.replaced() as place:
         result.write(place)
-        for page in pages:
+        if page is not None:
             page(place)
 
 

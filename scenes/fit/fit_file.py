@@ -135,6 +135,11 @@ class Fit:
     low: Array  # [p]
     high: Array  # [p]
 
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """The files that it names."""
+        return (self.study_file, self.file.parent / self.tables.measured)
+
     def study_at(self, theta: Sequence[float] | Array) -> StudyFile:
         """The study with the parameters' values.
 

@@ -7,7 +7,6 @@ Derivatives of light by reflectances of a box and by the albedo are those of the
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from copy import copy
 
 import numpy as np
@@ -23,7 +22,7 @@ from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.methods.light import illuminance
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.weather import Weather
-from scenes.fit.estimate import Readings
+from scenes.fit.estimate import Prior, Readings
 from scenes.fit.fit_file import LIGHT, Fit, MeasurementTable, by_step
 from scenes.heat.files import read_files
 from scenes.heat.study import balanced_rooms, felt_in, study_inputs
@@ -39,6 +38,8 @@ from scenes.room.zone import zone_surfaces
 
 Array = NDArray[np.float64]
 STEP = 0.1  # of a prior's deviation: central differences
+MOST_KNOWN = 64  # evaluations that are kept
+LEAST_OFFSET = 1e-5  # of a light meter whose tracing states no noise
 OFF_SURFACE = 0.002  # [m] of a sensor that stands for a surface
 LONE = SensorGrid(spacing=1e3)  # the least grid: one sensor of the work plane
 ALBEDO = ("albedo", "measured.albedo")
@@ -69,13 +70,17 @@ class FittedModel:
         self._lit = np.zeros(len(files.weather.times), dtype=bool)
         self._lit[skies.lit] = True
         self._read(fit)
-        self._engine = _traced_derivatives(fit, study) if len(self._lit_steps) else {}
+        self._derives = len(self._lit_steps) > 0 and study.trace.method != "point-in-time"
+        self._engine = _traced_derivatives(fit, study) if self._derives else {}
+        self.tracing_error: dict[int, float] = {}  # of each light meter's column: standard error over value
 
     def of(self, fit: Fit) -> FittedModel:
-        """This model, with what it has computed, for other readings at the same times."""
+        """The same model with what it has computed, for other readings at the same times."""
         model = copy(self)
         model._read(fit)
-        if any(len(a[1]) != len(b[1]) or (a[1] != b[1]).any() for a, b in zip(self.columns, model.columns, strict=True)):
+        if any(
+            len(a[1]) != len(b[1]) or (a[1] != b[1]).any() for a, b in zip(self.columns, model.columns, strict=True)
+        ):
             raise ValueError("expected readings at the same times")
         return model
 
@@ -109,25 +114,58 @@ class FittedModel:
             found.append(Readings(one.column, hours.astype(float), values[fitted], group, light))
         return found
 
+    def prior(self) -> Prior:
+        """That of the parameters, then of an offset of each light meter: the noise of tracing, alike in all hours."""
+        fit, count = self.fit, len(self._meters())
+        self.whole_derivatives(fit.mean)
+        noise = np.array([max(self.tracing_error.get(at, 0.0), LEAST_OFFSET) for at in self._meters()])
+        return Prior(
+            np.append(fit.mean, np.zeros(count)),
+            np.append(fit.deviation, noise),
+            np.append(fit.low, np.full(count, -np.inf)),
+            np.append(fit.high, np.full(count, np.inf)),
+            np.append(np.zeros(len(fit.mean), dtype=bool), np.ones(count, dtype=bool)),
+        )
+
     def values(self, theta: Array) -> Array:
-        """Readings of the fitted steps [N]."""
-        return self.whole(theta)[self._fitted_rows()]
+        """Readings of the fitted steps [N] by parameters and offsets."""
+        return (self._offset(theta) * self.whole(theta))[self._fitted_rows()]
 
     def derivatives(self, theta: Array) -> Array:
-        """Derivatives of `values` [N, p]."""
-        return self.whole_derivatives(theta)[self._fitted_rows()]
+        """Derivatives of `values` [N, p + meters]."""
+        count = len(self.fit.mean)
+        slopes = self._offset(theta)[:, None] * self.whole_derivatives(theta)
+        of_offsets = self._of_meters() * self.whole(theta)[:, None]
+        found: Array = np.hstack([slopes[:, :count], of_offsets])[self._fitted_rows()]
+        return found
+
+    def _meters(self) -> list[int]:
+        """The columns that are light."""
+        return [at for at, (one, _, _) in enumerate(self.columns) if one.quantity in LIGHT]
+
+    def _of_meters(self) -> Array:
+        """Which rows are of which light meter [M, meters], 1 or 0."""
+        of_column = np.concatenate([np.full(len(steps), at) for at, (_, steps, _) in enumerate(self.columns)])
+        found = np.zeros((len(of_column), len(self._meters())))
+        for number, at in enumerate(self._meters()):
+            found[:, number] = of_column == at
+        return found
+
+    def _offset(self, theta: Array) -> Array:
+        offsets: Array = 1.0 + self._of_meters() @ theta[len(self.fit.mean) :]
+        return offsets
 
     def _fitted_rows(self) -> NDArray[np.bool_]:
         return np.concatenate(self.fitted())
 
     def whole(self, theta: Array) -> Array:
-        """Readings of all steps that were measured [M], one column after the other."""
-        return self._at(theta)[0]
+        """Readings of all steps that were measured [M], one column after the other, without offsets."""
+        return self._at(theta[: len(self.fit.mean)])[0]
 
     def whole_derivatives(self, theta: Array) -> Array:
         """Derivatives of `whole` [M, p]."""
-        fit = self.fit
-        base = self._at(theta, derive=bool(self._engine))[1]
+        fit, theta = self.fit, theta[: len(self.fit.mean)]
+        base = self._at(theta, derive=self._derives)[1]
         slopes = np.zeros((len(self.whole(theta)), len(theta)))
         temperature = np.concatenate([np.full(len(s), one.quantity not in LIGHT) for one, s, _ in self.columns])
         for number, deviation in enumerate(fit.deviation):
@@ -156,6 +194,22 @@ class FittedModel:
         known = self._known.get(key)
         if known is not None and (known[1] is not None or not derive):
             return known
+        try:
+            values, slopes = self._computed(theta, derive)
+        except DataError as error:
+            pairs = zip(self.fit.tables.parameter, theta, strict=True)
+            stated = ", ".join(f"{one.label} {value:.4g}" for one, value in pairs)
+            message = f"the study cannot be computed with {stated} (state `low` and `high`): {error}"
+            raise DataError(message, file=self.fit.file, field="parameter") from error
+        found = np.concatenate(values), np.vstack(slopes) if derive else None
+        if len(self._known) > MOST_KNOWN:  # the first are about the priors' means, where every fit begins
+            for old in list(self._known)[MOST_KNOWN // 2 :]:
+                del self._known[old]
+        self._known[key] = found
+        return found
+
+    def _computed(self, theta: Array, derive: bool) -> tuple[list[Array], list[Array]]:
+        """Readings of each column, and their traced derivatives or zeros."""
         study = self.fit.study_at(theta)
         inputs, skies = self._inputs(study)
         values: list[Array] = [np.empty(0)] * len(self.columns)
@@ -166,11 +220,7 @@ class FittedModel:
             part = skies.part(np.flatnonzero(np.isin(skies.lit, self._lit_steps)))
             for space in inputs.spaces:
                 self._light(study, inputs, part, space, values, slopes if derive else None)
-        found = np.concatenate(values), np.vstack(slopes) if derive else None
-        if len(self._known) > 64:
-            self._known.clear()
-        self._known[key] = found
-        return found
+        return values, slopes
 
     def _temperatures(self, study: StudyFile, inputs: Inputs, skies: AnnualSky, values: list[Array]) -> None:
         balanced, traced = balanced_rooms(study, inputs, skies, self._cache)
@@ -206,8 +256,10 @@ class FittedModel:
         directions = np.array([one.direction for _, one, _ in own], dtype=float)
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         points = np.array([one.point for _, one, _ in own], dtype=float)
-        faces = [_surface(space, point, d) if one.quantity == "luminance" else None for (_, one, _), point, d in
-                 zip(own, points, directions, strict=True)]
+        faces = [
+            _surface(space, point, d) if one.quantity == "luminance" else None
+            for (_, one, _), point, d in zip(own, points, directions, strict=True)
+        ]
         points = points + OFF_SURFACE * directions * np.array([[face is not None] for face in faces])
         options = study.options.changed(sensitivities=slopes is not None)
         room = room_inputs(
@@ -235,6 +287,8 @@ class FittedModel:
             values[at] = factor * lit[first + sensor, hours]
             if slopes is None:
                 continue
+            noise = np.abs(changes["tracing"].illuminance[first + sensor]) / np.maximum(lit[first + sensor], 1e-9)
+            self.tracing_error.setdefault(at, float(np.median(noise)))
             for number, key in self._engine.items():
                 change = changes.get(key)
                 if change is None:
@@ -271,8 +325,6 @@ def _states(room: RoomInputs, light: RoomLight) -> NDArray[np.int64]:
 def _traced_derivatives(fit: Fit, study: StudyFile) -> dict[int, str]:
     """The parameters whose derivatives of light are traced, with their names in the sensitivities."""
     found: dict[int, str] = {}
-    if study.trace.method == "point-in-time":
-        return found
     box = study.box
     plain = box is not None and not box.recess and not any(window.frame for window in box.window)
     for number, one in enumerate(fit.tables.parameter):
@@ -314,8 +366,3 @@ def _with(theta: Array, number: int, value: float) -> Array:
     moved = np.array(theta, dtype=float)
     moved[number] = value
     return moved
-
-
-def parameter_names(fit: Fit) -> Sequence[str]:
-    """Names of the parameters."""
-    return [one.label for one in fit.tables.parameter]
