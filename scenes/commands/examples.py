@@ -45,6 +45,7 @@ EXAMPLES = {
         "cfs study study.toml --out study --method auto --time-budget 20min --dgp-error 10%",
     ),
     "design": ("cfs design design.toml --out design",),
+    "fit": ("cfs fit fit.toml --out fit",),
     "pv": ("cfs pv house.ifc --weather city.epw --study modules.toml --out yield",),
     "calibrate": ("cfs calibrate",),
     "ifc attach": (

@@ -272,7 +272,7 @@ def _solved(w: _Whitener, log_noise: Array, values: Array, slopes: Array, theta:
 
 def _covariance(w: _Whitener, log_noise: Array, slopes: Array, prior: Prior, widened: float = 1.0) -> Array:
     white = w(slopes, log_noise) * prior.deviation
-    inverse: Array = np.linalg.inv(white.T @ white / widened + np.eye(white.shape[1]))
+    inverse = np.linalg.inv(white.T @ white / widened + np.eye(white.shape[1]))
     covariance: Array = prior.deviation[:, None] * inverse * prior.deviation
     return covariance
 
