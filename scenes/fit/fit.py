@@ -16,13 +16,14 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import json_text, write_table, write_text
 from mitsuba_cfs.progress import Progress, silent
 from scenes.fit.estimate import Estimate, estimate
-from scenes.fit.fit_file import LEAST_READINGS, LIGHT, Fit
+from scenes.fit.fit_file import LEAST_READINGS, Fit
 from scenes.fit.model import KELVIN_NOISE, LIGHT_NOISE, FittedModel
 from scenes.head import Head
 from scenes.result_folder import ResultFolder
 
 Array = NDArray[np.float64]
 PRIOR_SHARE = 0.9  # of the prior's deviation: above it the readings do not determine a parameter
+UNLIKELY = 3.0  # prior deviations: a value farther from its mean contradicts the prior
 CORRELATED = 0.9  # of two parameters: above it only a combination of them is known
 BAND = 1.644854  # quantile of 90 %: intervals of readings
 FITTED_STUDY = "fitted.toml"
@@ -100,6 +101,7 @@ def _parameters(fit: Fit, found: Estimate, correlations: pd.DataFrame) -> pd.Dat
         share = float(found.standard_error[number] / fit.deviation[number])
         others = correlations.iloc[number].drop(one.label).abs()
         partner = str(others.idxmax()) if len(others) and others.max() > CORRELATED else ""
+        far = abs(found.value[number] - fit.mean[number]) / fit.deviation[number]
         rows.append(
             {
                 "parameter": one.label,
@@ -111,8 +113,10 @@ def _parameters(fit: Fit, found: Estimate, correlations: pd.DataFrame) -> pd.Dat
                 "low_95": found.low[number],
                 "high_95": found.high[number],
                 "error_of_prior_percent": 100 * share,
-                "determined": share <= PRIOR_SHARE,
+                "determined": share <= PRIOR_SHARE or far > UNLIKELY,
                 "only_with": partner,
+                "at_bound": bool(found.value[number] in (fit.low[number], fit.high[number])),
+                "deviations_from_prior": far,
             }
         )
     return pd.DataFrame(rows)
@@ -124,22 +128,22 @@ def _comparison(model: FittedModel, found: Estimate) -> pd.DataFrame:
     variance = np.einsum("np,pq,nq->n", slopes, found.covariance, slopes)
     tables: list[pd.DataFrame] = []
     first = 0
-    for (one, steps, values), fitted in zip(model.columns, model.fitted(), strict=True):
-        rows = slice(first, first + len(steps))
-        first += len(steps)
-        light = one.quantity in LIGHT
+    for one, fitted in zip(model.columns, model.fitted(), strict=True):
+        rows = slice(first, first + len(one.values))
+        first += len(one.values)
+        light = one.light
         noise = found.noise[LIGHT_NOISE if light else KELVIN_NOISE].deviation
-        scale = np.abs(whole[rows]) if light else np.ones(len(steps))
+        scale = np.abs(whole[rows]) if light else np.ones(len(one.values))
         traced = model.tracing_error.get(len(tables), 0.0)
         half = BAND * np.sqrt(variance[rows] + (noise**2 + traced**2) * scale**2)
         tables.append(
             pd.DataFrame(
                 {
-                    "time": model.weather.times[steps],
-                    "column": one.column,
-                    "quantity": one.quantity,
+                    "time": one.ends,
+                    "column": one.table.column,
+                    "quantity": one.table.quantity,
                     "fitted": fitted,
-                    "measured": values,
+                    "measured": one.values,
                     "model": whole[rows],
                     "low": np.maximum(whole[rows] - half, 0.0) if light else whole[rows] - half,
                     "high": whole[rows] + half,

@@ -104,6 +104,7 @@ class FitFile(TomlTable):
     time: str = "time"  # column of the intervals' ends
     begin: datetime | None = None  # of the readings that are fitted; others are predicted
     end: datetime | None = None
+    average_h: Annotated[Positive, Field(le=24)] | None = None  # means of so many hours are fitted; None: time steps
     parameter: Annotated[tuple[ParameterTable, ...], Field(min_length=1)]
     measurement: Annotated[tuple[MeasurementTable, ...], Field(min_length=1)]
 

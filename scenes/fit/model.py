@@ -8,6 +8,7 @@ Derivatives of light by reflectances of a box and by the albedo are those of the
 from __future__ import annotations
 
 from copy import copy
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -48,6 +49,28 @@ OF_GROUPS = {"box.reflectance.floor": "floor", "box.reflectance.wall": "walls", 
 KELVIN_NOISE, LIGHT_NOISE = "temperature", "light"  # groups of instruments with one noise
 
 
+@dataclass(frozen=True, slots=True)
+class Column:
+    """The readings of an instrument, means of blocks of time steps."""
+
+    table: MeasurementTable
+    steps: NDArray[np.int64]  # [n] of the weather, that have a reading
+    block: NDArray[np.int64]  # [n] the mean that each belongs to, 0 to B - 1
+    values: Array  # [B]
+    hours: Array  # [B] middle [h]
+    ends: pd.DatetimeIndex  # [B]
+
+    @property
+    def light(self) -> bool:
+        """Whether it is light."""
+        return self.table.quantity in LIGHT
+
+    def means(self, of_steps: Array) -> Array:
+        """Means [B] of values of the steps [n]."""
+        found: Array = np.bincount(self.block, of_steps) / np.bincount(self.block)
+        return found
+
+
 class FittedModel:
     """What instruments read by parameters of a study; one evaluation is a computation of the study."""
 
@@ -78,9 +101,7 @@ class FittedModel:
         """The same model with what it has computed, for other readings at the same times."""
         model = copy(self)
         model._read(fit)
-        if any(
-            len(a[1]) != len(b[1]) or (a[1] != b[1]).any() for a, b in zip(self.columns, model.columns, strict=True)
-        ):
+        if any(not np.array_equal(a.steps, b.steps) for a, b in zip(self.columns, model.columns, strict=True)):
             raise ValueError("expected readings at the same times")
         return model
 
@@ -88,30 +109,35 @@ class FittedModel:
         """Take the steps and the readings of each column."""
         self.fit = fit
         of_steps = by_step(fit.readings, self.weather)
-        self.columns: list[tuple[MeasurementTable, NDArray[np.int64], Array]] = []  # steps and readings of each
+        self.columns: list[Column] = []
+        step_h, times = self.weather.step_h, self.weather.times
         for one in fit.tables.measurement:
             values = of_steps[one.column].to_numpy(dtype=float)
             there = np.isfinite(values) & (self._lit if one.quantity in LIGHT else True)
             steps = np.flatnonzero(there)
-            self.columns.append((one, steps, values[steps]))
-        light = [steps for one, steps, _ in self.columns if one.quantity in LIGHT]
+            number = np.floor(steps * step_h / max(fit.tables.average_h or 0.0, step_h) + 1e-9)
+            block = np.unique(number, return_inverse=True)[1].reshape(-1)
+            last = np.flatnonzero(np.diff(block, append=len(block)))
+            column = Column(one, steps, block, np.empty(0), np.empty(0), times[steps[last]])
+            if len(steps):
+                column = replace(column, values=column.means(values[steps]), hours=column.means(steps * step_h))
+            self.columns.append(column)
+        light = [column.steps for column in self.columns if column.light]
         self._lit_steps = np.unique(np.concatenate(light)) if light else np.empty(0, dtype=np.int64)
 
     def fitted(self) -> list[NDArray[np.bool_]]:
-        """Which steps of each column are fitted; the others are predicted."""
+        """Which means of each column are fitted; the others are predicted."""
         tables, times = self.fit.tables, self.weather.times
         begin = times[0] - pd.Timedelta(days=1) if tables.begin is None else pd.Timestamp(tables.begin)
         end = times[-1] if tables.end is None else pd.Timestamp(tables.end)
-        return [np.asarray((times[steps] > begin) & (times[steps] <= end)) for _, steps, _ in self.columns]
+        return [np.asarray((one.ends > begin) & (one.ends <= end)) for one in self.columns]
 
     def readings(self) -> list[Readings]:
         """The readings that are fitted."""
         found = []
-        for (one, steps, values), fitted in zip(self.columns, self.fitted(), strict=True):
-            hours = steps[fitted] * self.weather.step_h
-            light = one.quantity in LIGHT
-            group = LIGHT_NOISE if light else KELVIN_NOISE
-            found.append(Readings(one.column, hours.astype(float), values[fitted], group, light))
+        for one, fitted in zip(self.columns, self.fitted(), strict=True):
+            group = LIGHT_NOISE if one.light else KELVIN_NOISE
+            found.append(Readings(one.table.column, one.hours[fitted], one.values[fitted], group, one.light))
         return found
 
     def prior(self) -> Prior:
@@ -128,7 +154,7 @@ class FittedModel:
         )
 
     def values(self, theta: Array) -> Array:
-        """Readings of the fitted steps [N] by parameters and offsets."""
+        """Readings of the fitted means [N] by parameters and offsets."""
         return (self._offset(theta) * self.whole(theta))[self._fitted_rows()]
 
     def derivatives(self, theta: Array) -> Array:
@@ -141,11 +167,11 @@ class FittedModel:
 
     def _meters(self) -> list[int]:
         """The columns that are light."""
-        return [at for at, (one, _, _) in enumerate(self.columns) if one.quantity in LIGHT]
+        return [at for at, one in enumerate(self.columns) if one.light]
 
     def _of_meters(self) -> Array:
         """Which rows are of which light meter [M, meters], 1 or 0."""
-        of_column = np.concatenate([np.full(len(steps), at) for at, (_, steps, _) in enumerate(self.columns)])
+        of_column = np.concatenate([np.full(len(one.values), at) for at, one in enumerate(self.columns)])
         found = np.zeros((len(of_column), len(self._meters())))
         for number, at in enumerate(self._meters()):
             found[:, number] = of_column == at
@@ -159,7 +185,7 @@ class FittedModel:
         return np.concatenate(self.fitted())
 
     def whole(self, theta: Array) -> Array:
-        """Readings of all steps that were measured [M], one column after the other, without offsets."""
+        """Readings of all means that were measured [M], one column after the other, without offsets."""
         return self._at(theta[: len(self.fit.mean)])[0]
 
     def whole_derivatives(self, theta: Array) -> Array:
@@ -167,7 +193,7 @@ class FittedModel:
         fit, theta = self.fit, theta[: len(self.fit.mean)]
         base = self._at(theta, derive=self._derives)[1]
         slopes = np.zeros((len(self.whole(theta)), len(theta)))
-        temperature = np.concatenate([np.full(len(s), one.quantity not in LIGHT) for one, s, _ in self.columns])
+        temperature = np.concatenate([np.full(len(one.values), not one.light) for one in self.columns])
         for number, deviation in enumerate(fit.deviation):
             traced = number in self._engine and base is not None
             if traced and base is not None:
@@ -213,8 +239,8 @@ class FittedModel:
         study = self.fit.study_at(theta)
         inputs, skies = self._inputs(study)
         values: list[Array] = [np.empty(0)] * len(self.columns)
-        slopes = [np.zeros((len(steps), len(theta))) for _, steps, _ in self.columns]
-        if any(one.quantity not in LIGHT for one, _, _ in self.columns):
+        slopes = [np.zeros((len(one.values), len(theta))) for one in self.columns]
+        if any(not one.light for one in self.columns):
             self._temperatures(study, inputs, skies, values)
         if len(self._lit_steps):
             part = skies.part(np.flatnonzero(np.isin(skies.lit, self._lit_steps)))
@@ -227,15 +253,15 @@ class FittedModel:
         for space in inputs.spaces:
             number = next(i for i, room in enumerate(balanced.rooms) if room.space.guid == space.guid)
             result = balanced.results[number]
-            for at, (one, steps, _) in enumerate(self.columns):
-                if one.quantity in LIGHT or self._space_of(inputs, one).guid != space.guid:
+            for at, one in enumerate(self.columns):
+                if one.light or self._space_of(inputs, one.table).guid != space.guid:
                     continue
-                if one.quantity == "operative temperature":
+                if one.table.quantity == "operative temperature":
                     zone = balanced.rooms[number].zone
                     result = felt_in(study, zone, result, traced.radiants.get(space.guid))
-                    values[at] = result.operative_c[steps]
+                    values[at] = one.means(result.operative_c[one.steps])
                 else:
-                    values[at] = result.air_c[steps]
+                    values[at] = one.means(result.air_c[one.steps])
 
     def _light(
         self,
@@ -247,18 +273,18 @@ class FittedModel:
         slopes: list[Array] | None,
     ) -> None:
         own = [
-            (at, one, steps)
-            for at, (one, steps, _) in enumerate(self.columns)
-            if one.quantity in LIGHT and self._space_of(inputs, one).guid == space.guid
+            (at, one)
+            for at, one in enumerate(self.columns)
+            if one.light and self._space_of(inputs, one.table).guid == space.guid
         ]
         if not own:
             return
-        directions = np.array([one.direction for _, one, _ in own], dtype=float)
+        directions = np.array([one.table.direction for _, one in own], dtype=float)
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-        points = np.array([one.point for _, one, _ in own], dtype=float)
+        points = np.array([one.table.point for _, one in own], dtype=float)
         faces = [
-            _surface(space, point, d) if one.quantity == "luminance" else None
-            for (_, one, _), point, d in zip(own, points, directions, strict=True)
+            _surface(space, point, d) if one.table.quantity == "luminance" else None
+            for (_, one), point, d in zip(own, points, directions, strict=True)
         ]
         points = points + OFF_SURFACE * directions * np.array([[face is not None] for face in faces])
         options = study.options.changed(sensitivities=slopes is not None)
@@ -281,10 +307,10 @@ class FittedModel:
         first = len(lit) - len(own)
         of_step = {int(step): at for at, step in enumerate(skies.lit)}
         changes = {one.key: one for one in light_changes(room, light, state)} if slopes is not None else {}
-        for sensor, ((at, _, steps), face) in enumerate(zip(own, faces, strict=True)):
-            hours = [of_step[int(step)] for step in steps]
+        for sensor, ((at, one), face) in enumerate(zip(own, faces, strict=True)):
+            hours = [of_step[int(step)] for step in one.steps]
             factor = 1.0 if face is None else face[1] / np.pi
-            values[at] = factor * lit[first + sensor, hours]
+            values[at] = one.means(factor * lit[first + sensor, hours])
             if slopes is None:
                 continue
             noise = np.abs(changes["tracing"].illuminance[first + sensor]) / np.maximum(lit[first + sensor], 1e-9)
@@ -293,9 +319,9 @@ class FittedModel:
                 change = changes.get(key)
                 if change is None:
                     continue
-                slopes[at][:, number] = factor * change.illuminance[first + sensor, hours]
+                slopes[at][:, number] = one.means(factor * change.illuminance[first + sensor, hours])
                 if face is not None and key == f"reflectance_{face[0]}":
-                    slopes[at][:, number] += lit[first + sensor, hours] / np.pi
+                    slopes[at][:, number] += one.means(lit[first + sensor, hours] / np.pi)
 
     def _space_of(self, inputs: Inputs, one: MeasurementTable) -> Space:
         """The room of a measurement.

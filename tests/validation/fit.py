@@ -166,9 +166,9 @@ def planted_readings(fit: Fit, truth: FittedModel, theta: Array, kind: str, rng:
     """What instruments with errors read of a study with known parameters."""
     exact = truth.whole(theta)
     readings, first = fit.readings.astype(float) * np.nan, 0
-    for one, steps, _ in truth.columns:
-        values = exact[first : first + len(steps)]
-        first += len(steps)
+    for one in truth.columns:
+        values = exact[first : first + len(one.values)]
+        first += len(one.values)
         errors = rng.standard_normal(len(values))
         if kind == "heat":
             for number in range(1, len(errors)):
@@ -177,7 +177,7 @@ def planted_readings(fit: Fit, truth: FittedModel, theta: Array, kind: str, rng:
             values = values + KELVIN * errors
         else:
             values = values * (1 + SHARE * errors)
-        readings.loc[truth.weather.times[steps], one.column] = values
+        readings.loc[truth.weather.times[one.steps], one.table.column] = values
     return readings
 
 
