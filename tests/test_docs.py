@@ -184,9 +184,9 @@ def test_tables_of_the_heat_page_have_no_unknown_keys(folder):
     from scenes.room.operation_tables import OperationTables
     from scenes.toml_file import read_table, validated
 
-    study, rules, schedules, *parts = examples(REPOSITORY / "docs" / "thermal.md", "toml")
+    study, rules, across, schedules, *parts = examples(REPOSITORY / "docs" / "thermal.md", "toml")
     whole = 'weather = "a.epw"\nbuilding = "a.ifc"\ncouple = true\n'
-    models = [(StudyFile, study), (OperationTables, rules), (OperationTables, schedules)]
+    models = [(StudyFile, study), *((OperationTables, one) for one in (rules, across, schedules))]
     box = '[[system]]\nbsdf = "a.xml"\n[box]\nwidth = 3\ndepth = 4\nheight = 3\nwindow = []\n'
     models += [(StudyFile, part + box if "weather =" in part else whole + part) for part in parts]
     assert len(parts) == 5

@@ -15,6 +15,7 @@ from scenes.room.control_year import ControlYear
 from scenes.room.glare import rating_of
 from scenes.room.inputs import room_inputs
 from scenes.room.light import room_light
+from scenes.room.operation import SharedYear
 from scenes.room.operation_tables import OperationTables
 from scenes.room.predictive import Planner, predictive_states
 from scenes.room.solar import seasonal_outdoors
@@ -29,8 +30,10 @@ TABLES = {"gains": {"lighting_w_m2": 10.0, "occupied": [0, 24]}, "loads": {"heat
 def of(variant, glass, milk, blind, weather, skies):
     """The year of the room with a table of `predictive`, and keys of its control."""
 
-    def year(limit: float, controller=None, gains=None, **predictive) -> ControlYear:
+    def year(limit: float, controller=None, gains=None, shared=None, **predictive) -> ControlYear:
         control = {"rule": "predictive", "limit_dgp": limit, "predictive": predictive}
+        if shared:
+            control["group"] = [{"facades": ["S"], "across": "building"}]
         tables = TABLES | {"gains": TABLES["gains"] | (gains or {})}
         room = room_inputs(
             TWO,
@@ -41,6 +44,7 @@ def of(variant, glass, milk, blind, weather, skies):
             operation=OperationTables.model_validate({"control": control} | tables),
             skies=skies,
             controller=controller,
+            shared=shared,
         )
         light = room_light(room)
         return ControlYear(room, light, seasonal_outdoors(room, light))
@@ -112,6 +116,21 @@ def test_the_glare_term_of_the_eye_is_used_where_it_is_asked_for(of) -> None:
     by_picture = Planner(of(0.32), room.operation, room.control.rules[0])
     assert by_picture.glare[list(HOURS)] == pytest.approx(0.95 * 5.87e-5 * eye + 0.16)
     assert not by_picture.rated.any()
+
+
+def test_plans_keep_the_states_of_a_group_that_other_rooms_share(of) -> None:
+    """The south windows as they are told; the plans choose for the north windows alone."""
+    told = np.arange(8760) % 3
+    year = of(0.32, shared={"S": SharedYear(told, np.full(8760, -1), ())})
+    south = year.groups.index("S")
+    found = predictive_states(year)
+    assert np.array_equal(found[:, south], told)
+    free = predictive_states(of(0.32))
+    assert not np.array_equal(free[:, south], told)
+    called = of(0.32, lambda hour: 0, shared={"S": SharedYear(told, np.full(8760, -1), ())})
+    states = controlled_states(called.room, called.light, called.outdoors)
+    assert np.array_equal(states[:, called.room.windows.control == south][:, 0], told)
+    assert not states[:, called.room.windows.control != south].any()
 
 
 def test_plans_dim_each_zone_of_lamps_by_its_own_sensor(of) -> None:

@@ -12,8 +12,11 @@ from bim.model import Building, Element, SpaceGroup
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
-from scenes.demo import WEATHER
+from mitsuba_cfs.progress import silent
+from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.resolver import WindowOverrides
+from scenes.heat.study import run_study
+from scenes.heat.study_file import read_study
 from scenes.input_files import InputFiles
 from scenes.inputs import Inputs, inputs_of
 from scenes.room.control_groups import control_groups, shared_groups
@@ -24,6 +27,10 @@ from scenes.room.room import asked_year, compute_room, inputs_of_room
 from scenes.room.shared_states import with_shared_states
 from scenes.run.options import JobOptions
 from scenes.run.run import run_inputs
+from scenes.study.one_case import case_inputs, case_year
+from scenes.study.plan import plan_of
+from scenes.study.study_file import Study
+from tests.conftest import REPOSITORY
 from tests.scenes.small_box import FEW, OPENING
 from tests.scenes.test_equal_rooms import moved
 from tests.trace.rooms import quad
@@ -48,6 +55,7 @@ TWO_ZONES = (
     SpaceGroup("Flat 1", "", ("near-guid", "up-guid")),
 )
 BUILDING = replace(BOX, spaces=ROOMS, elements=(WALL,), zones=TWO_ZONES)
+TWO_ROOMS = REPOSITORY / "docs" / "tutorials" / "two_rooms.hbjson"
 SUN = {"rule": "irradiance", "close_above": 150.0, "open_below": 100.0}
 
 
@@ -278,3 +286,42 @@ def test_a_function_in_several_rooms_moves_the_group_by_the_most_closed(
     ]
     near, far = (one.operation.shading.of_windows for one in found)
     assert np.array_equal(near, far) and near.any()
+
+
+FRONT = """
+[control]
+rule = "irradiance"
+close_above = 200
+groups = "room"
+across = "building"
+sensor_rooms = ["Hall"]
+"""
+STATES = (
+    f'[[system]]\nbsdf = "{Path(VENETIAN_BLIND).with_name("glazing.xml")}"\n[[system]]\nbsdf = "{VENETIAN_BLIND}"\n'
+)
+
+
+def test_cases_of_a_study_and_the_rooms_of_a_heat_study_have_the_states_of_the_group(variant, tmp_path) -> None:
+    """The office behind its own facade, the hall behind another window: the hall's sensor moves both."""
+    operation = tmp_path / "front.toml"
+    operation.write_text(STATES + FRONT)
+    rooms = [{"name": name, "building": TWO_ROOMS, "spaces": [name]} for name in ("Office", "Hall")]
+    study = Study.model_validate(
+        {
+            "room": rooms,
+            "system": [{"name": "front", "operation": operation}],
+            "climate": [{"name": "Chicago", "weather": WEATHER}],
+            "methods": ["three-phase"],
+            "glare": "none",
+            "options": {"sensor_samples": 256, "patch_samples": 256, "sky_subdivision": 1, "sensor_spacing": 1.0},
+        }
+    )
+    office, hall = (case_year(case_inputs(case), case).operation.shading.states for case in plan_of(study).cases)
+    assert np.array_equal(office, hall) and 0.05 < hall.mean() < 0.6
+
+    file = tmp_path / "heat.toml"
+    trace = "[trace]\nsky_subdivision = 1\npatch_samples = 256\nview_factors = false\n"
+    file.write_text(f'weather = "{WEATHER}"\nbuilding = "{TWO_ROOMS}"\n{STATES}{FRONT}{trace}')
+    years, _ = run_study(read_study(file), silent)
+    first, second = (year.hours["shading_state"].to_numpy() for year in years)
+    assert np.array_equal(first, second) and 0.05 < first.mean() < 0.6

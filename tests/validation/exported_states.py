@@ -1,14 +1,17 @@
-"""Shading states of the hours in the EnergyPlus model that `cfs thermal --energyplus` writes.
+"""Shading states of the hours in the EnergyPlus models that `cfs thermal` and `cfs run` write with `--energyplus`.
 
     python -m tests.validation exported_states
 
 A room in Chicago with equal windows to the south and to the north, each in three states by its own
 irradiance.  EnergyPlus runs the written files; its "Surface Construction Index" says which
 construction each window had, its transmitted sun whether that is the closed one.
+
+The demo's two offices, by the command `cfs run`: their windows move by the irradiance of each facade.
 """
 
 from __future__ import annotations
 
+import json
 import tempfile
 from pathlib import Path
 
@@ -16,7 +19,8 @@ import numpy as np
 import pandas as pd
 
 from mitsuba_cfs.progress import silent
-from scenes.demo import VENETIAN_BLIND, WEATHER
+from scenes.cli import run
+from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.heat.energyplus import energyplus_twin
 from scenes.heat.study import BalancedRooms, run_study
 from scenes.heat.study_file import read_study
@@ -91,6 +95,51 @@ def compare(control: str = CONTROL, step_minutes: int = 60) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+RUN = """
+[[system]]
+bsdf = "{glazing}"
+[[system]]
+bsdf = "{blind}"
+[control]
+rule = "irradiance"
+close_above = 200
+"""
+
+
+def compare_run() -> pd.DataFrame:
+    """The same of `cfs run --energyplus` for the demo's offices, without what windows pass."""
+    with tempfile.TemporaryDirectory() as name:
+        folder, out = Path(name), Path(name) / "out"
+        operation = folder / "office.toml"
+        operation.write_text(RUN.format(glazing=GLAZING, blind=VENETIAN_BLIND))
+        arguments = ["--weather", str(WEATHER), "--operation", str(operation), "--quick", "--energyplus"]
+        if run(["run", str(OFFICE), *arguments, "--out", str(out)]) != 0:
+            raise RuntimeError("cfs run failed")
+        states = [pd.read_csv(file)["shading_state"].to_numpy() for file in sorted(out.glob("*/operation.csv"))]
+        model = json.loads((out / "model.epJSON").read_text())
+        windows = list(model["FenestrationSurface:Detailed"])
+        model["Output:Diagnostics"] = {"all": {"diagnostics": [{"key": "DisplayAdvancedReportVariables"}]}}
+        model["Output:Variable"] = {
+            window: {"key_value": window, "variable_name": INDEX, "reporting_frequency": "Hourly"} for window in windows
+        }
+        (out / "model.epJSON").write_text(json.dumps(model))
+        theirs = run_written(out / "model.epJSON", WEATHER)
+    rows = []
+    for window, ours in zip(windows, states, strict=True):
+        index = theirs[f"{window.upper()}:{INDEX}"].to_numpy()
+        own = {j: float(pd.Series(index[ours == j]).mode()[0]) for j in np.unique(ours)}
+        rows.append(
+            {
+                "window": window,
+                "moves": int(np.count_nonzero(np.diff(ours))),
+                **{f"state {j} h": int((ours == j).sum()) for j in own},
+                "constructions": len(set(own.values())),
+                "differ h": int(np.count_nonzero(index != np.array([own[j] for j in ours]))),
+            }
+        )
+    return pd.DataFrame(rows)
+
+
 def main() -> pd.DataFrame:
-    """Both windows."""
-    return compare()
+    """The windows of the study, and of the run."""
+    return pd.concat([compare(), compare_run()], ignore_index=True)

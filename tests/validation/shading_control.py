@@ -1,6 +1,9 @@
 """Shading states of windows on two facades against EnergyPlus' own shading control.
 
     python -m tests.validation shading_control
+    python -m tests.validation shading_control --weather AUS_NSW.Sydney.947670_IWEC.epw
+
+With a weather, only its windows in the open are compared, by two rules.
 
 A room in Chicago with equal windows to the south and to the north, open and below an overhang with
 a fin.  EnergyPlus runs here and now with a `WindowShadingControl` for each window:
@@ -67,12 +70,12 @@ PLATES = "".join(
 )
 
 
-def our_states(control: str, states: int, *, shaded: bool) -> pd.DataFrame:
+def our_states(control: str, states: int, *, shaded: bool, weather: Path = WEATHER) -> pd.DataFrame:
     """Our state of both windows by hour [H], columns S and N."""
     bsdf = (GLAZING, *[VENETIAN_BLIND] * (states - 1))
     systems = "".join(f'[[system]]\nbsdf = "{path}"\n' for path in bsdf)
     plates = PLATES if shaded else ""
-    text = STUDY.format(weather=WEATHER, plates=plates, systems=systems, control=control)
+    text = STUDY.format(weather=weather, plates=plates, systems=systems, control=control)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "study.toml"
         file.write_text(text)
@@ -212,6 +215,32 @@ def ground_seen(rays: int = 1_000_000) -> float:
     return 1.0 - float(hidden[dz < 0].mean())
 
 
+BLOCKING = {
+    "shading_control_type": "OnIfHighSolarOnWindow",
+    "setpoint": 0.1,
+    "type_of_slat_angle_control_for_blinds": "BlockBeamSolar",
+}
+CUT_OFF = f'rule = "cut-off"\nslat_tilts_deg = {list(TILTS)}\nslat_width = {WIDTH}\nslat_spacing = {SPACING}'
+
+
+def elsewhere(weather: Path) -> pd.DataFrame:
+    """Hours of the year in which the states in the open differ under another weather."""
+    rows = []
+    control = {"shading_control_type": "OnIfHighSolarOnWindow", "setpoint": 200.0}
+    theirs = run_energyplus(energyplus_model(control, shaded=False), weather, outputs=OUTPUTS)
+    ours = our_states('rule = "irradiance"\nclose_above = 200', 2, shaded=False, weather=weather)
+    for name in WINDOWS:
+        on = theirs[f"{name} on"].to_numpy().round().astype(int)
+        rows.append(_row("irradiance above 200 W/m2", False, name, ours[name].to_numpy(), on))
+    theirs = run_energyplus(energyplus_model(BLOCKING, shaded=False), weather, outputs=OUTPUTS)
+    ours = our_states(CUT_OFF, len(TILTS), shaded=False, weather=weather)
+    for name in WINDOWS:
+        slats = energyplus_cut_off(theirs, name)
+        row = _row("cut-off", False, name, ours[name].to_numpy(), slats)
+        rows.append(row | {"same cause h": int((cut_off_under(theirs, name) != slats).sum())})
+    return pd.DataFrame(rows)
+
+
 def compare() -> pd.DataFrame:
     """Hours of the year in which the states differ, by rule, surroundings and window."""
     rows = []
@@ -231,14 +260,8 @@ def compare() -> pd.DataFrame:
                 same = ((theirs[f"{name} sun"] - hidden).to_numpy() > limit).astype(int)
                 row["same cause h"] = int((ours[name].to_numpy() != same).sum())
                 rows.append(row | {"its two models differ h": int((other != on).sum())})
-        control = {
-            "shading_control_type": "OnIfHighSolarOnWindow",
-            "setpoint": 0.1,
-            "type_of_slat_angle_control_for_blinds": "BlockBeamSolar",
-        }
-        theirs = run_energyplus(energyplus_model(control, shaded=shaded), WEATHER, outputs=OUTPUTS)
-        rule = f'rule = "cut-off"\nslat_tilts_deg = {list(TILTS)}\nslat_width = {WIDTH}\nslat_spacing = {SPACING}'
-        ours = our_states(rule, len(TILTS), shaded=shaded)
+        theirs = run_energyplus(energyplus_model(BLOCKING, shaded=shaded), WEATHER, outputs=OUTPUTS)
+        ours = our_states(CUT_OFF, len(TILTS), shaded=shaded)
         for name in WINDOWS:
             slats = energyplus_cut_off(theirs, name)
             row = _row("cut-off", shaded, name, ours[name].to_numpy(), slats)
@@ -300,7 +323,9 @@ def sun_errors() -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def main() -> pd.DataFrame:
-    """All rules, surroundings and windows, after the errors of the sun."""
+def main(*, weather: Path | None = None) -> pd.DataFrame:
+    """All rules, surroundings and windows, after the errors of the sun; or those of `elsewhere`."""
+    if weather is not None:
+        return elsewhere(weather)
     print(sun_errors().round(3).to_string(index=False), f"\n\nground seen beside the fin: {ground_seen():.3f}\n")
     return compare()
