@@ -96,7 +96,7 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
     rated = [room.light.glare for room, _ in asked if room.light is not None and room.light.glare is not None]
     if rated and of_glare:
         operated = any(glare.operated for glare in rated)
-        blinds = gettext("blinds closed by the rule of LM-83") if operated else gettext("all blinds open")
+        blinds = translated(result.blinds) if operated else gettext("all blinds open")
         parts.append(gettext("Rated with {blinds}.", blinds=blinds))
     return " ".join(parts)
 

@@ -76,3 +76,4 @@ class Compliance:
     notes: tuple[str, ...]
     issues: tuple[Issue, ...]
     seconds: dict[str, float]  # by part
+    blinds: str = ""  # how they move where glare, temperatures and light at the eye are judged, in words

@@ -52,6 +52,7 @@ from mitsuba_cfs.files import reason, write_text
 from mitsuba_cfs.spectra.detectors import NANOMETRES
 from scenes import plausible
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
+from thermal.blackbox import LayerResistance, conductance_table
 from thermal.closure import U_MODELS, Closure
 from thermal.errors import ThermalInputError
 from thermal.gases import GAS_NAMES
@@ -80,7 +81,7 @@ ByPatch = Annotated[tuple[float, ...], Field(min_length=PATCHES, max_length=PATC
 Table = TypeVar("Table", bound="ClosureTable")
 WindowTable = TypeVar("WindowTable", bound="WindowHeatTable")
 # the model of U that a key belongs to
-OF_MODEL = {"gap": "gap", "surface": "surface", "layers": "layers", "u_slope": "linear"}
+OF_MODEL = {"gap": "gap", "surface": "surface", "conductance": "surface", "layers": "layers", "u_slope": "linear"}
 SHADES = ("slats", "threads", "holes", "openness")  # what makes a layer a shade
 
 
@@ -322,6 +323,28 @@ class GapTable(TomlTable):
     emissivity: tuple[Share, Share] = (0.837, 0.03)  # of the two faces that bound it
 
 
+class ConductanceTable(TomlTable):
+    """Conductance between the outermost and the innermost face by their temperatures, on a regular grid."""
+
+    mean_c: Annotated[tuple[float, ...], Field(min_length=2)]  # mean of both faces [degC]
+    difference_k: Annotated[tuple[float, ...], Field(min_length=2)]  # between them [K]
+    values: tuple[tuple[Positive, ...], ...]  # [W/(m2 K)], one row for each mean
+
+    @model_validator(mode="after")
+    def _is_a_grid(self) -> ConductanceTable:
+        for name in ("mean_c", "difference_k"):
+            steps = np.diff(getattr(self, name))
+            if steps.min() <= 0 or np.ptp(steps) > 1e-6 * steps.max():
+                raise ValueError(f"{name}: expected values that rise by equal steps")
+        if {len(row) for row in self.values} != {len(self.difference_k)} or len(self.values) != len(self.mean_c):
+            raise ValueError(f"values: expected {len(self.mean_c)} rows of {len(self.difference_k)}")
+        return self
+
+    def resistance(self) -> LayerResistance:
+        """R(T_m, dT)."""
+        return conductance_table(self.mean_c, self.difference_k, self.values)
+
+
 class ClosureTable(TomlTable):
     """How a system's thermal model is closed: in a study, and beside a BSDF file."""
 
@@ -330,6 +353,7 @@ class ClosureTable(TomlTable):
     u_slope: Annotated[float, Field(ge=-0.05, le=0.05)] | None = None  # of U for "linear" [1/K]
     # 1/R = c0 + c1 x + c2 d + c3 d2 + c4 x d + c5 x2, see thermal.blackbox.LayerResistance
     surface: Annotated[tuple[float, ...], Field(min_length=6, max_length=6)] | None = None
+    conductance: ConductanceTable | None = None
     layers: tuple[GlazingLayerTable, ...] = ()  # outermost first: ISO 15099
     glazing_height: Annotated[Positive, plausible.LENGTH] = 1.5  # [m] of the layers
     glazing_width: Annotated[Positive, plausible.LENGTH] = 1.0  # [m]: open edges at its sides
@@ -344,7 +368,7 @@ class ClosureTable(TomlTable):
         if len(models) > 1:
             raise ValueError(f"{stated[0]} and {stated[1]} exclude each other")
         model = self.u_model
-        if model in ("gap", "surface", "layers") and model not in models:
+        if model in OF_MODEL.values() and model != "linear" and model not in models:
             raise ValueError(f'u_model "{model}" and {model} belong together')
         if model is not None and models and models != {model}:
             raise ValueError(f'{stated[0]}: belongs to u_model "{OF_MODEL[stated[0]]}"')
@@ -379,10 +403,16 @@ class ClosureTable(TomlTable):
             gap,
             self.realised_inner_resistance,
             self.realised_outer_resistance,
-            surface=self.surface,
+            surface=self._resistance(),
             unit=unit,
             **more,
         )
+
+    def _resistance(self) -> LayerResistance | None:
+        """R(T_m, dT) as stated, by coefficients or by a table."""
+        if self.conductance is not None:
+            return self.conductance.resistance()
+        return None if self.surface is None else LayerResistance("surface", self.surface)
 
 
 PEAK_SHARES = {"specular": 1.0, "lobe": 0.0}  # that pass straight on

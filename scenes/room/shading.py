@@ -14,8 +14,8 @@ from mitsuba_cfs.sky.sun import is_up, sun_directions
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
-from scenes.room.operation import OperationHours
-from scenes.room.shading_by_light import days, group_states, states_by_people, take_jointly
+from scenes.room.operation import OperationHours, SharedYear
+from scenes.room.shading_by_light import days, states_by_people, take_jointly
 from scenes.room.shading_rules import (
     JOINT_RULES,
     LOAD_RULES,
@@ -77,7 +77,7 @@ def predicts(room: RoomInputs) -> bool:
     """Whether the shading of a room follows plans of the hours ahead."""
     if room.operation is None or room.controller is not None or not room.space.windows:
         return False
-    return room.control.rules[0].rule == "predictive"
+    return any(rule.rule == "predictive" for rule in room.control.rules)
 
 
 Levels = Mapping[Condition, int]  # of conditions: 1 met, 0 not; of a rule that waits its own
@@ -254,7 +254,9 @@ def ruled_year(
     if operation is None or not room.space.windows:
         return RuledYear(states, np.full_like(states, -1), ())
     signals, moved_by = _Signals(room, outdoors, met), np.full_like(states, -1)
-    reasons = tuple(dict.fromkeys(one for rule in rules for one in _reasons(rule)))
+    followed = room.followed
+    known_reasons = (one for year in followed.values() for one in year.reasons)
+    reasons = tuple(dict.fromkeys((*(one for rule in rules for one in _reasons(rule)), *known_reasons)))
 
     def reading(kinds: Sequence[str]) -> NDArray[np.int64]:
         found = [c for c, r in enumerate(rules) if any(leaf.rule in kinds for leaf in r.leaves)]
@@ -268,7 +270,9 @@ def ruled_year(
         raise ValueError("rules against glare, by daylight or by people need the room's light")
     by_people: dict[int, StateArray] = {}
     for c in range(len(rules)):
-        if c not in joint and c not in manual:
+        if c in followed:
+            states[:, c], moved_by[:, c] = followed[c].states, _renumbered(followed[c], reasons)
+        elif c not in joint and c not in manual:
             rule_of(c, {})
     if light is not None and len(manual):
         by_people = states_by_people(room, light, states, manual)
@@ -280,6 +284,13 @@ def ruled_year(
             known = {kind: states[:, c].copy() for kind in JOINT_RULES}
             rule_of(c, known | ({"manual": by_people[c]} if c in by_people else {}))
     return RuledYear(states, moved_by, reasons)
+
+
+def _renumbered(year: SharedYear, reasons: Sequence[str]) -> StateArray:
+    """The number of the reason of each move [H] of a year, among `reasons`; -1: none."""
+    numbers = np.array([*map(reasons.index, year.reasons), -1], dtype=np.int64)
+    moved: StateArray = np.where(_moves(year.states), numbers[year.moved_by], -1)
+    return moved
 
 
 def _reasons(rule: ShadingRule) -> Iterator[str]:
@@ -315,7 +326,7 @@ def _by_rule(
     def plain(rule: ShadingRule, place: str) -> StateArray:
         if rule.rule in known:
             return known[rule.rule]
-        closed = rule.state or group_states(room, c) - 1
+        closed = rule.state or room.windows.states_of(c) - 1
         if rule.rule in ("schedule", *WEATHER_RULES) and operation is not None:
             of_hours = OperationHours(operation, room.weather)
             return of_hours.states(rule, place, room.windows.states, closed)
@@ -344,31 +355,39 @@ def _by_rule(
             return states, np.full(hours, -1)
         if rule.rule in ("any", "all"):
             parts = [of(*one) for one in _parts(rule, place)]
-            states, by = _combined(rule.rule == "any", parts)
+            states, by = combined_states(rule.rule == "any", parts)
         else:
             states = plain(rule, place)
             if rule.inverse:
-                states = np.where(states > 0, 0, rule.state or group_states(room, c) - 1)
+                states = np.where(states > 0, 0, rule.state or room.windows.states_of(c) - 1)
             by = np.where(_moves(states), reasons.index(rule.rule), -1)
-        if place == at_once:
-            return states, by
-        wait, hold = _waits(rule, room.weather.step_h)
-        few = rule.most_moves or 1
-        changes: dict[str, Callable[[StateArray], StateArray]] = {
-            "open_delay_h": lambda one: delayed(one, wait),
-            "hold_h": lambda one: held(one, hold),
-            "until": lambda one: latched(one, _ends(room, rule.until)),
-            "most_moves": lambda one: with_few_moves(one, few, days(room)),
-        }
-        for key in WAITS:
-            if getattr(rule, key):
-                waited = changes[key](states)
-                same = _moves(states) & (waited == states)
-                by = np.where(_moves(waited), np.where(same, by, reasons.index(key)), -1)
-                states = waited
-        return states, by
+        return (states, by) if place == at_once else waited_states(room, rule, states, by, reasons)
 
     return of(*(at or (room.control.rules[c], room.control.places[c])))
+
+
+def waited_states(
+    room: RoomInputs, rule: ShadingRule, states: StateArray, by: StateArray, reasons: Sequence[str]
+) -> tuple[StateArray, StateArray]:
+    """States that a rule asks for [H] as it waits, and the number of the reason of each move [H].
+
+    Args: by: the reasons of the moves that are asked for, as numbers of `reasons`.
+    """
+    wait, hold = _waits(rule, room.weather.step_h)
+    few = rule.most_moves or 1
+    changes: dict[str, Callable[[StateArray], StateArray]] = {
+        "open_delay_h": lambda one: delayed(one, wait),
+        "hold_h": lambda one: held(one, hold),
+        "until": lambda one: latched(one, _ends(room, rule.until)),
+        "most_moves": lambda one: with_few_moves(one, few, days(room)),
+    }
+    for key in WAITS:
+        if getattr(rule, key):
+            waited = changes[key](states)
+            same = _moves(states) & (waited == states)
+            by = np.where(_moves(waited), np.where(same, by, reasons.index(key)), -1)
+            states = waited
+    return states, by
 
 
 def _moves(states: StateArray) -> NDArray[np.bool_]:
@@ -376,7 +395,7 @@ def _moves(states: StateArray) -> NDArray[np.bool_]:
     return np.concatenate([[False], states[1:] != states[:-1]])
 
 
-def _combined(closed: bool, parts: Sequence[tuple[StateArray, StateArray]]) -> tuple[StateArray, StateArray]:
+def combined_states(closed: bool, parts: Sequence[tuple[StateArray, StateArray]]) -> tuple[StateArray, StateArray]:
     """The most closed, or most open, states of parts [H], and the reason of each move [H].
 
     The part that has the extreme after a move towards it, or before one away from it, moves then.

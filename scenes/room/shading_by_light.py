@@ -90,7 +90,7 @@ def _by_habit(
 
     Light of the groups is added: that of each is known in each of its states.
     """
-    counts = [group_states(room, c) for c in members]
+    counts = [room.windows.states_of(c) for c in members]
 
     def indoors(of_groups: StateArray) -> FloatArray:
         rows = light.states(of_groups[:, room.windows.control])
@@ -127,7 +127,7 @@ def _by_habit(
 def _closed(room: RoomInputs, c: int) -> int:
     """The last state of a control group, or that which its rule by people names."""
     leaf = next(one for one in room.control.rules[c].leaves if one.rule == "manual")
-    return leaf.state or group_states(room, c) - 1
+    return leaf.state or room.windows.states_of(c) - 1
 
 
 def _present(room: RoomInputs) -> FloatArray:
@@ -164,7 +164,7 @@ def take_jointly(
     rules that leave a target of daylight the most closed one that does.  All other
     groups are in their states.
     """
-    counts = [group_states(room, c) for c in joint]
+    counts = [room.windows.states_of(c) for c in joint]
     combinations = np.array(list(product(*map(range, counts))), dtype=np.int64)
     if len(combinations) > MOST_COMBINATIONS:
         message = f"{len(joint)} groups have {len(combinations)} combinations of states, at most "
@@ -226,7 +226,7 @@ def _mean_of_groups(
     """
     windows, each, areas = room.windows, [], []
     for n, c in enumerate(groups.tolist()):
-        count = group_states(room, c)
+        count = room.windows.states_of(c)
         of_states = values[n] if len(values) else np.arange(count) / max(count - 1, 1)
         each.append(of_states[np.minimum(combinations[:, n], len(of_states) - 1)])
         areas.append(sum(windows.groups[g].area for g in np.flatnonzero(windows.control == c)))
@@ -294,12 +294,6 @@ def seat_view(room: RoomInputs, seat: Seat, view: View) -> View:
         direction = np.array([np.sin(angle), np.cos(angle), 0.0])
     position = view.position if position is None else position
     return fisheye(position, direction, room.options.outputs.picture_size)
-
-
-def group_states(room: RoomInputs, c: int) -> int:
-    """Number of states of a control group: of its window group with the most."""
-    windows = room.windows
-    return max(len(windows.systems[g]) for g in np.flatnonzero(windows.control == c))
 
 
 def days(room: RoomInputs) -> NDArray[np.int64]:

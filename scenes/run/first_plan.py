@@ -115,7 +115,7 @@ def _planned(room: RoomInputs, matrices: PhaseMatrices) -> PlannedRoom:
     light = phase_light(matrices, optics, room.skies)
     of_room = RoomLight(matrices.scene, matrices, light, None)
     by_light = bool(control_signals(room) - READ) or room.controller is not None
-    unshaded = by_light or predicts(room) or bool(temperature_conditions(room))
+    unshaded = by_light or predicts(room) or bool(temperature_conditions(room)) or any(room.control.shared)
     state = np.zeros((room.skies.hours, len(room.windows.groups)), dtype=np.int64)
     if not unshaded:
         state = shading_states(room, of_room, None)

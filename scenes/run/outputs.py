@@ -68,6 +68,8 @@ def write_results(
             write_text(temporary / FIRST_PLAN, first_plan)
         if netcdf:
             write_netcdf(result, temporary / NETCDF)
+        if result.twin is not None:
+            result.twin.write(temporary)
         for write, page in ((write_report, REPORT), (write_explorer, EXPLORER)):
             if write is not None:
                 faults += _faults(write, result, temporary / page)
