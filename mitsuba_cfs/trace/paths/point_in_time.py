@@ -13,7 +13,8 @@ from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
+from mitsuba_cfs.trace.kernels.path_options import PathOptions
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
 from mitsuba_cfs.trace.kernels.sampling import batch_key, path_generator, vectors
 from mitsuba_cfs.trace.kernels.scene import OPAQUE
@@ -53,26 +54,10 @@ def daylight_coefficients(
     """
     if cache is not None and key is None:
         raise ValueError("a room needs a `key` before its matrix can be kept in a cache")
-    sky = PatchSky(subdivision)
-    return accumulate(
-        sensor_batches(room, sky, points, directions, samples=samples, max_depth=max_depth, seed=seed),
-        stopping=stopping,
-        label="daylight coefficients",
-        progress=progress,
-        entry=cache_entry(
-            cache,
-            "daylight coefficients",
-            key,
-            np.asarray(points),
-            np.asarray(directions),
-            subdivision,
-            samples,
-            max_depth,
-            seed,
-            by=__name__,
-            stopping=stopping,
-        ),
-    )
+    sky, paths = PatchSky(subdivision), PathOptions(samples, max_depth, stopping, seed, progress, cache)
+    batch = sensor_batches(room, sky, points, directions, samples=samples, max_depth=max_depth, seed=seed)
+    inputs = key, np.asarray(points), np.asarray(directions), subdivision
+    return paths.estimate("daylight coefficients", batch, *inputs, by=__name__)
 
 
 CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that paths prefer
