@@ -23,6 +23,7 @@ Paths are relative to the TOML file.  The angular function is for the visible ba
 from __future__ import annotations
 
 import csv
+import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -44,6 +45,7 @@ from mitsuba_cfs.bsdf.spectral_pane import (
     SpectralPane,
     read_glazing_layers,
     read_pane_file,
+    read_product_file,
     read_spectral_pane,
     spectral_glazing,
 )
@@ -73,7 +75,8 @@ ANGULAR_OPTIONAL = ("reflectance_front", "reflectance_back")
 SPECTRUM_COLUMNS = ("wavelength_nm", "transmittance")
 WIDEST_GAP_NM = 50.0  # between visible data of a pane, which files have every 5 to 20 nm
 REFLECTANCE_COLUMNS = ("wavelength_nm", "reflectance")
-SLAT_STEP = 10  # nanometres between the columns of a file of coloured slats
+SLAT_STEP = 10  # nanometres between the reflectances in a file of coloured slats
+SLAT_NAMES = ("wavelength_nm", "reflectance", "shares")  # of that file
 SPECTRUM_OPTIONAL = ("reflectance",)  # of the side of a shade that faces the panes
 Film = Annotated[Positive, plausible.RESISTANCE]  # [m2 K/W]
 PATCHES = KLEMS_FULL.size
@@ -423,7 +426,7 @@ class SpectralTable(TomlTable):
 
     panes: tuple[Path, ...] = ()  # Optics or IGSDB files
     shade: Path | None = None  # CSV file of `SPECTRUM_COLUMNS`
-    slats: Path | None = None  # CSV file that `cfs bsdf generate` writes of a coloured blind
+    slats: Path | None = None  # JSON file that `cfs bsdf generate` writes of a coloured blind
 
     @model_validator(mode="after")
     def _has_some(self) -> SpectralTable:
@@ -492,33 +495,33 @@ def read_spectrum(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     return np.interp(NANOMETRES, nm, tau), np.interp(NANOMETRES, nm, rho)
 
 
-SLAT_NAMES = ("patch", "straight")  # columns of the file of coloured slats, before those of its wavelengths
-
-
 def write_slat_light(light: SlatLight, path: Path) -> None:
-    """A CSV file of coloured slats: a row for each patch of incidence, a column for each ten nanometres."""
-    some = np.arange(0, len(NANOMETRES), SLAT_STEP)
-    patches = np.arange(1, KLEMS_FULL.size + 1)
-    head = [*SLAT_NAMES, *(f"{nm:g}" for nm in NANOMETRES[some])]
-    rows = np.column_stack([patches, light.straight, light.whole[:, some]])
-    lines = [",".join(head), *(",".join(f"{value:.5g}" for value in row) for row in rows)]
-    write_text(path, "\n".join(lines) + "\n")
+    """A JSON file of coloured slats: reflectance, and shares [n][emergent][incident] that are reflected n times."""
+    document = {
+        "wavelength_nm": NANOMETRES[::SLAT_STEP].tolist(),
+        "reflectance": [round(value, 5) for value in light.reflectance[::SLAT_STEP].tolist()],
+        "shares": np.round(light.shares, 4).tolist(),
+    }
+    write_text(path, json.dumps(document, separators=(",", ":")) + "\n")
 
 
 def read_slat_light(path: Path) -> SlatLight:
-    """The transmittance of coloured slats of a file that `write_slat_light` wrote.
+    """The colour of the slats of a file that `write_slat_light` wrote.
 
-    Raises: `DataError` for a file that is no such table.
+    Raises: `DataError` for another file.
     """
-    wanted = [f"{nm:g}" for nm in NANOMETRES[::SLAT_STEP]]
-    columns = csv_columns(path, (*SLAT_NAMES, *wanted))
-    if not np.array_equal(columns["patch"], np.arange(1, KLEMS_FULL.size + 1)):
-        raise DataError(f"expected a row for each of {KLEMS_FULL.size} patches", file=path, field="patch")
-    values = np.array([columns[name] for name in wanted]).T
-    if min(values.min(), columns["straight"].min()) < 0 or values.max() > 1:
-        raise DataError("expected transmittances from 0 to 1", file=path)
-    whole = np.array([np.interp(NANOMETRES, NANOMETRES[::SLAT_STEP], row) for row in values])
-    return SlatLight(columns["straight"], whole)
+    document, size = read_product_file(path), KLEMS_FULL.size
+    try:
+        nm, rho, shares = (np.array(document[name], dtype=float) for name in SLAT_NAMES)
+    except (KeyError, TypeError, ValueError):
+        raise DataError(f"expected numbers of {', '.join(SLAT_NAMES)}", file=path) from None
+    if shares.ndim != 3 or shares.shape[1:] != (size, size):
+        raise DataError(f"expected {size} x {size} patches for each number of reflections", file=path, field="shares")
+    if nm.shape != rho.shape or not np.array_equal(nm, NANOMETRES[::SLAT_STEP]):
+        raise DataError(f"expected a reflectance every {SLAT_STEP} nm from 380 to 780", file=path, field="reflectance")
+    if rho.min() < 0 or rho.max() > 1:
+        raise DataError("expected reflectances from 0 to 1", file=path, field="reflectance")
+    return SlatLight(np.interp(NANOMETRES, nm, rho), shares)
 
 
 def read_reflectance(path: Path) -> NDArray[np.float64]:

@@ -36,6 +36,7 @@ PANES_THICKNESS = 0.024  # [m]
 BLIND_TO_GLASS, BLIND_TO_AIR = 6.0, 18.0  # [W/(m2 K)] EN 13363-1, external blind
 BEFORE_BLIND = 1 / BLIND_TO_AIR, 1 / BLIND_TO_GLASS, GAP  # [m2 K/W] on the way in to each layer
 BLIND_TOTAL = 1 / GLAZING_U + sum(BEFORE_BLIND[:2])  # [m2 K/W]
+PLACE = 'shading_position = "external"  # before the glazing\n'
 BEAM = 'see_through = "specular"  # the beam between the slats\n'
 PATHS = 262_144  # for each incident patch and side
 
@@ -47,7 +48,7 @@ def main() -> None:
     panes = {band: [specular_klems(pane, KLEMS_FULL) for pane in pair] for band, pair in PANES.items()}
     blinds = {band: combine_layers([blind, *pair]) for band, pair in panes.items()}
     name = f"Exterior venetian blind at {TILT_DEG:.0f} degrees, double low-e glazing"
-    text = thermal_values(blinds["Solar"], BEFORE_BLIND, BLIND_TOTAL) + BEAM
+    text = thermal_values(blinds["Solar"], BEFORE_BLIND, BLIND_TOTAL) + PLACE + BEAM
     _write("venetian_blind", blinds, name, layer.thickness + PANES_THICKNESS, 0.9, text)
     glazings = {band: combine_layers(pair) for band, pair in panes.items()}
     text = thermal_values(glazings["Solar"], (OUTER_FILM, GAP), 1 / GLAZING_U)
