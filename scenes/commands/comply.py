@@ -47,7 +47,8 @@ def list_rules(context: click.Context, _: click.Parameter, value: bool) -> None:
         rule = read_rule(name)
         click.echo(f"{name}: {rule.title} ({rule.edition})")
         if rule.sites:
-            click.echo(f"  asks for the weather of: {', '.join(rule.sites)}")
+            words = [f"'{word}'" for word in rule.sites]
+            click.echo(f"  asks for the weather of: {rule.weather_asked} (site or file name has {' or '.join(words)})")
         for label, sentences in (("included", rule.included), ("left out", rule.left_out)):
             for sentence in sentences:
                 click.echo(f"  {label}: {sentence}")

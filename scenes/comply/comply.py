@@ -557,7 +557,7 @@ class Check:
                 yield Note(
                     "{rule}: no verdict. It asks for the weather of {sites}; {file} is not that.",
                     rule=Note(rule.title),
-                    sites=", ".join(rule.sites),
+                    sites=rule.weather_asked,
                     file=weather.site if weather.file is None else weather.file.name,
                 )
             for sentence in rule.included:

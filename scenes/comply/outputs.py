@@ -91,7 +91,7 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
     rule = result.rules[verdict.rule]
     of_glare = any("glare" in need.parts for level in verdict.criterion.level for need in level.needs)
     if unknown and not rule.fits(result.weather):
-        parts.append(gettext("It asks for the weather of {sites}.", sites=", ".join(rule.sites)))
+        parts.append(gettext("It asks for the weather of {sites}.", sites=rule.weather_asked))
     elif unknown and of_glare and all(room.light is None or room.light.glare is None for room, _ in asked):
         parts.append(gettext("Annual glare was not asked for."))
     rated = [room.light.glare for room, _ in asked if room.light is not None and room.light.glare is not None]

@@ -110,6 +110,12 @@ class RuleTable(TomlTable):
         return not self.sites or _named(weather, self.sites)
 
     @property
+    def weather_asked(self) -> str:
+        """The weather that the rule, or one of its criteria, asks for: the first word of each list."""
+        lists = (self.weather, *(one.weather for one in self.criterion))
+        return ", ".join(dict.fromkeys(words[0] for words in lists if words))
+
+    @property
     def sites(self) -> tuple[str, ...]:
         """Words of the weather that the rule, or one of its criteria, asks for."""
         words = [*self.weather, *(word for one in self.criterion for word in one.weather)]
