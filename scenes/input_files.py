@@ -24,7 +24,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, silent, summed
-from mitsuba_cfs.sky.epw import is_wea, read_epw, read_wea
+from mitsuba_cfs.sky.epw import weather_of_file
 from mitsuba_cfs.sky.matrix import DEFAULT_DEW_POINT_C
 from mitsuba_cfs.sky.weather import Weather
 from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
@@ -134,25 +134,20 @@ def read_weather(path: str | PathLike[str], *, hourly: bool = True, temperatures
 
     Raises: `DataError` for a file that cannot be used.
     """
-    wea = is_wea(path)
-    if wea and temperatures:
-        message = "is a WEA file, which has no temperatures: give an EPW file"
-        raise DataError(f"{message} (cfs dgp and cfs picture take it)", file=path)
-    weather = _of_wea(Path(path)) if wea else read_epw(path)
+    weather = weather_of_file(path)
+    if weather.dry_bulb_c is None:
+        if temperatures:
+            message = "is a WEA file, which has no temperatures: give an EPW file"
+            raise DataError(f"{message} (cfs dgp and cfs picture take it)", file=path)
+        note = Note(
+            "{file} states no dew point: that of Radiance's programs, {dew:.1f} °C, is used for the luminous efficacy.",
+            file=Path(path).name,
+            dew=DEFAULT_DEW_POINT_C,
+        )
+        weather = replace(weather, notes=(*weather.notes, note))
     if hourly and weather.step_h != 1.0:
         raise DataError(f"has steps of {weather.step_h:g} h; the run needs hours", file=path)
     return weather
-
-
-def _of_wea(path: Path) -> Weather:
-    """The weather of a WEA file, with a note of what it lacks."""
-    note = Note(
-        "{file} states no dew point: that of Radiance's programs, {dew:.1f} °C, is used for the luminous efficacy.",
-        file=path.name,
-        dew=DEFAULT_DEW_POINT_C,
-    )
-    weather = read_wea(path)
-    return replace(weather, notes=(*weather.notes, note))
 
 
 def read_override(options: InputOptions, *, heat: bool, by: str = "--cfs") -> FenestrationSystem | None:

@@ -29,13 +29,14 @@ from mitsuba_cfs.sky.weather_table import (
 )
 
 
-def is_wea(path: str | PathLike[str]) -> bool:
-    """Whether a file begins as a WEA does; `DataError` where it cannot be read."""
+def weather_of_file(path: str | PathLike[str], *, whole_year: bool = True) -> Weather:
+    """The weather of an EPW file, or of a WEA file, which begins with "place"; as `read_epw` and `read_wea`."""
     try:
         with open(path, "rb") as file:
-            return file.read(5).lower() == b"place"
+            is_wea = file.read(5).lower() == b"place"
     except OSError as error:
         raise DataError(f"cannot be read: {reason(error)}", file=path) from error
+    return read_wea(path, whole_year=whole_year) if is_wea else read_epw(path)
 
 
 def read_wea(path: str | PathLike[str], *, whole_year: bool = True) -> Weather:

@@ -336,10 +336,10 @@ def sun_steps(weather: Weather, sun_model: str) -> np.ndarray:
 
 
 def read_weather(path: Path) -> Weather:
-    """An EPW or a WEA file, by its first word."""
-    from mitsuba_cfs.sky.epw import is_wea, read_epw, read_wea
+    """The weather of a file, its notes told."""
+    from mitsuba_cfs.sky.epw import weather_of_file
 
-    weather = read_wea(path, whole_year=False) if is_wea(path) else read_epw(path)
+    weather = weather_of_file(path, whole_year=False)
     _tell(weather)
     return weather
 

@@ -36,7 +36,6 @@ from scenes.comply.blinds import DEFAULT_NAME, open_and_closed
 from scenes.comply.dwellings import dwelling_words, judged, uses_of_rooms
 from scenes.comply.files import ComplyFiles, read_files
 from scenes.comply.findings import EyeLight, Findings, GridLight, RoomHeat, SeatGlare, calendar_of
-from scenes.comply.glass import windows_without_view
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outdoors import OutdoorMesh, outdoors_of
 from scenes.comply.results import CheckedRoom, Compliance, GridSummary, RoomLights
@@ -44,7 +43,7 @@ from scenes.comply.rules import GridTable
 from scenes.comply.sunlight import SunExposure, sun_day, sun_exposure
 from scenes.comply.tables import USE_WORDS
 from scenes.comply.uses import RoomUse
-from scenes.comply.view_out import ViewOut, view_out
+from scenes.comply.view_out import ViewOut, view_out, windows_without_view
 from scenes.fenestration.ratings import system_ratings
 from scenes.fenestration.sight import sight_through
 from scenes.fenestration.systems import FenestrationSystem, States

@@ -15,10 +15,9 @@ from mitsuba_cfs.metrics import lm83
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.comply.blinds import diffuse_shade, open_and_closed, with_default_shade
 from scenes.comply.comply import lights_of, sensor_grid_of
-from scenes.comply.glass import windows_without_view
 from scenes.comply.outdoors import outdoors_of
 from scenes.comply.rules import GridTable, read_rule
-from scenes.comply.view_out import view_out
+from scenes.comply.view_out import view_out, windows_without_view
 from scenes.demo import WEATHER
 from scenes.fenestration.sight import sight_through
 from scenes.fenestration.systems import FenestrationSystem

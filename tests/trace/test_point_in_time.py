@@ -190,7 +190,7 @@ def test_daylight_coefficients_of_a_diffuser_are_the_three_phase_matrix():
     from mitsuba_cfs.trace.kernels.estimate import Stopping
     from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
     from mitsuba_cfs.trace.matrices.view import view_matrix
-    from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
+    from mitsuba_cfs.trace.paths.point_in_time import daylight_coefficients
     from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
 
     interior, groups = rooms.test_room()

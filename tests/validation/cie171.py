@@ -27,7 +27,7 @@ from mitsuba_cfs.methods.optics import AngularOptics, BsdfOptics, SystemOptics
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import Stopping
-from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
+from mitsuba_cfs.trace.paths.point_in_time import daylight_coefficients
 from mitsuba_cfs.trace.paths.scene import PathTracingScene
 from tests.validation.cie171_cases import GLASS, SKIES, Case, cases, cie_sky, reported
 from tests.validation.cie171_quadrature import INDEX, Array

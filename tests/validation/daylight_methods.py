@@ -39,8 +39,7 @@ from mitsuba_cfs.trace.kernels.estimate import Stopping
 from mitsuba_cfs.trace.kernels.scattering import Scattering, sun_scattering
 from mitsuba_cfs.trace.matrices.daylight import daylight_matrix
 from mitsuba_cfs.trace.matrices.view import view_matrix
-from mitsuba_cfs.trace.paths.daylight_coefficients import daylight_coefficients
-from mitsuba_cfs.trace.paths.point_in_time import point_in_time
+from mitsuba_cfs.trace.paths.point_in_time import daylight_coefficients, point_in_time
 from mitsuba_cfs.trace.paths.scene import PathOptics, PathTracingScene, Sky, path_optics
 from tests.validation.blind_room import TILTS, BlindRoom, blind_layer, empty, glass_klems, slats, test_room
 from tests.validation.fine_basis import fine_basis

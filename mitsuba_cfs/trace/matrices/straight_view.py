@@ -23,7 +23,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, even_numbers, points_on_triangles
 from mitsuba_cfs.trace.kernels.bins import SkyBins
-from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
 from mitsuba_cfs.trace.kernels.path_options import PathOptions
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts, roulette
 from mitsuba_cfs.trace.kernels.sampling import (
@@ -36,7 +36,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     vectors,
 )
 from mitsuba_cfs.trace.kernels.scattering import Scattering
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.matrices.daylight import add_daylight_paths
 
 SIDES = ("west", "east", "south", "north", "floor", "ceiling")  # of the box round a room
@@ -65,7 +65,6 @@ def escaped_view(
     seed: int = 0,
     progress: Progress = silent,
     cache: MatrixCache | None = None,
-    scenes: SceneCache | None = None,
 ) -> Escape:
     """Share of each sensor's view that meets neither a surface nor a window, and its points.
 
@@ -78,14 +77,14 @@ def escaped_view(
         surfaces, groups, points, directions: as of `view_matrix`.
         samples: paths of each sensor in each of 4 batches.
     """
-    scenes = SceneCache() if scenes is None else scenes
+    paths = PathOptions(int(samples), max_depth, Stopping(batches=BATCHES), seed, progress, cache)
     points, directions = sensors_of(points, directions)
-    tracer = scenes.scene(surfaces, groups)
+    tracer = paths.scenes.scene(surfaces, groups)
     corners = np.concatenate([surfaces.triangles, *(w.triangles for group in groups for w in group.windows)]).reshape(
         -1, 3
     )
     box = [tracer.place(f(axis=0)) for f in (corners.min, corners.max)]
-    S, n = len(points), int(samples)
+    S, n = len(points), paths.samples
     place = vectors(points - tracer.centre, mi.Point3f)
     normal = vectors(directions)
     shape = (S, len(SIDES), FIGURES)
@@ -109,25 +108,7 @@ def escaped_view(
         _add_escapes(tracer, *box, sums, starts)
         return sums_of(sums, shape) / n
 
-    estimate = accumulate(
-        batch,
-        stopping=Stopping(batches=BATCHES),
-        label="escape",
-        progress=progress,
-        entry=cache_entry(
-            cache,
-            "escape",
-            surfaces,
-            groups,
-            points,
-            directions,
-            n,
-            max_depth,
-            seed,
-            by=__name__,
-            stopping=Stopping(batches=BATCHES),
-        ),
-    )
+    estimate = paths.estimate("escape", batch, surfaces, groups, points, directions, by=__name__)
     return _escape(estimate, tracer.centre)
 
 

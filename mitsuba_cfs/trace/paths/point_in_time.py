@@ -10,14 +10,55 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.directions import sensors_of
+from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
+from mitsuba_cfs.trace.kernels.path_options import PathOptions
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
 from mitsuba_cfs.trace.kernels.sampling import batch_key, path_generator, vectors
 from mitsuba_cfs.trace.kernels.scene import OPAQUE
 from mitsuba_cfs.trace.paths.scene import PatchSky, PathTracingScene, Sky
 from mitsuba_cfs.trace.paths.sun import Vertex, leave_by_gloss, on_disc, sun_at, sun_images, surface_sun
+
+
+def daylight_coefficients(
+    room: PathTracingScene,
+    points: ArrayLike,
+    directions: ArrayLike,
+    *,
+    subdivision: int = 4,
+    samples: int = 16384,
+    max_depth: int = 24,
+    stopping: Stopping | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+    cache: MatrixCache | None = None,
+    key: object = None,
+) -> Estimate:
+    """Illuminance per unit luminance of each sky patch [S, P], straight through the real BSDF.
+
+        E[s] = sum over p of C[s, p] sky[p]
+
+    The two-phase method: the paths of `point_in_time` from the sensors through whatever fills the
+    windows to the patches; one matrix for one state, without the angular patches of V T D.
+
+    Args:
+        points, directions: [S, 3] sensor positions [m] and normals.
+        subdivision: Reinhart's MF (1, 2, 4, 6).
+        samples: paths for each sensor in each batch.
+        cache, key: where the matrix is kept, and what the room was made from (surfaces, window
+            groups, BSDF data), which tells it from others there.
+
+    Source: Tregenza and Waters 1983, "Daylight coefficients", Lighting Research & Technology 15.
+    """
+    if cache is not None and key is None:
+        raise ValueError("a room needs a `key` before its matrix can be kept in a cache")
+    sky, paths = PatchSky(subdivision), PathOptions(samples, max_depth, stopping, seed, progress, cache)
+    batch = sensor_batches(room, sky, points, directions, samples=samples, max_depth=max_depth, seed=seed)
+    inputs = key, np.asarray(points), np.asarray(directions), subdivision
+    return paths.estimate("daylight coefficients", batch, *inputs, by=__name__)
+
 
 CONE_COSINE = float(np.cos(np.radians(6.0)))  # directions round the sun that paths prefer
 # Shares of a room path's directions that aim at windows and near the sun; the rest follows the

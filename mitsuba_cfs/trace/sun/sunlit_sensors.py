@@ -152,7 +152,7 @@ def room_light(
     """Illuminance of sensors by what the room reflects of a group's straight beam [B][S, h].
 
     Args:
-        shares: [B][S, c] of `room_shares`, one for each seed of the beam.
+        shares: [B][S, c] of `shares_and_derivatives`, one for each seed of the beam.
         flux: [c, B * h] of the `Beam`.
         strength: [h] illuminance normal to the sun.
     """
