@@ -105,7 +105,7 @@ def test_command_rates_a_state_and_writes_what_the_balance_takes(tmp_path, shade
     assert again.shading_position == "internal"
 
 
-PANES = LAYERS[LAYERS.index("[[layers]]") :].partition('gap = { width = 0.05 }')[0]
+PANES = LAYERS[LAYERS.index("[[layers]]") :].partition("gap = { width = 0.05 }")[0]
 
 
 def test_written_data_of_panes_give_the_same_resistance_at_any_temperatures(tmp_path, shade):
