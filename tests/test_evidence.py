@@ -22,6 +22,7 @@ NO_EVIDENCE = {
     "bsdf.md": {"| stated | by | used as | DGP |"},
     "daylight.md": {"| function | gives |"},
     "design.md": {"| table | keys |", "| key | what varies |", "| in the folder | what |"},
+    "fit.md": {"| table | keys |", "| column | content |", "| in the folder | what |"},
     "glare.md": {"| index | of | source |", "| option | default | |", "| part of a five-phase picture | resolution |"},
     "radiance.md": {"| type | as | status | how |"},
     "thermal.md": {"| to | read |", "| closure | absorptances from | layer resistance | film resistances |"},
@@ -40,6 +41,7 @@ NO_EVIDENCE = {
     "app.md": {"| file | content | read by |"},
     "studies.md": {"| in the folder | what |", "| event | what is done |"},
     "pv.md": {"| key | meaning |"},
+    "site.md": {"| in the folder of results | quantity | met if |"},
 }
 ONCE = {"benchmarks.md", "evidence_reliability.md", "reliability.md"}  # pages that say it once, for all of their tables
 

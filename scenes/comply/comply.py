@@ -103,7 +103,8 @@ def solar_sentence(system: FenestrationSystem) -> str:
     heat = thermal_system(system)
     found = {rating.method: rating for rating in system_ratings(system, heat)}
     rating: ThermalRating = found.get(STANDARD) or found["heat balance"]
-    limits = ", ".join(f"{limit:.2f}" for limit in CLASSES["g"])
+    values = {f"limit_{number}": limit for number, limit in enumerate(CLASSES["g"])}
+    limits = Note(", ".join(f"{{{key}:.2f}}" for key in values), **values)
     source = Note("as in the heat balance") if rating.method == "heat balance" else rating.method
     return Note(
         "{system}: g_tot {g:.2f} at normal incidence ({source}), class {solar_class} for the "
@@ -315,7 +316,7 @@ def check_rooms(
         tuple(check.assumptions(rooms, left_out(spaces, glazed, dark))),
         check.head,
         tuple(dict.fromkeys(notes)),
-        (*building.issues, *view_issues, *issues),
+        (*check.head.issues, *view_issues, *issues),
         check.seconds,
         blinds=check.blinds,
     )

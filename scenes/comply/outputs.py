@@ -85,6 +85,7 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
         both = len(asked) == 2
         all_of_them = ngettext("The one room meets it.", "All {count} rooms meet it.", len(asked))
         parts.append(gettext("Both rooms meet it.") if both else all_of_them)
+        parts += _least_favourable(asked)
     if unknown and len(unknown) < len(asked):  # else the level says so
         parts.append(gettext("Not computed: {rooms}.", rooms=_names(unknown)))
     rule = result.rules[verdict.rule]
@@ -99,6 +100,20 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
         blinds = translated(result.blinds) if operated else gettext("all blinds open")
         parts.append(gettext("Rated with {blinds}.", blinds=blinds))
     return " ".join(parts)
+
+
+def _least_favourable(asked: Sequence[tuple[CheckedRoom, RoomVerdict]]) -> Iterator[str]:
+    """The room nearest to the limit, where the criterion is one value against one limit."""
+    (_, first), *_ = asked
+    if len(first.criterion.level) > 1 or len(first.criterion.level[0].needs) > 1:
+        return
+    (need,) = first.criterion.level[0].needs
+    sign = 1.0 if need.at_least is not None else -1.0
+    room, worst = min(asked, key=lambda one: sign * (one[1].values[0][0] or 0.0))
+    value = shown(need, worst.values[0][0])
+    yield gettext(
+        "Least favourable: {room} ({value}, limit {limit}).", room=room.space.label, value=value, limit=limit_of(need)
+    )
 
 
 def _short_of(room: str, verdict: RoomVerdict) -> str:

@@ -13,7 +13,7 @@ from bim.report.issue import Issue
 from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.assess import BuildingVerdict, RoomVerdict
 from scenes.comply.findings import Calendar, SeatGlare
-from scenes.comply.need import Need
+from scenes.comply.needs import Need
 from scenes.comply.rules import RuleTable
 from scenes.comply.sunlight import SunDay, SunExposure
 from scenes.comply.uses import RoomUse

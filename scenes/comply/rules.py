@@ -11,8 +11,7 @@ from pydantic import Field, model_validator
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
-from scenes.comply.need import Need
-from scenes.comply.needs import AnyNeed
+from scenes.comply.needs import AnyNeed, Need
 from scenes.language.catalogue import N_
 from scenes.room.operation_tables import OperationTables
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated

@@ -366,9 +366,7 @@ def run_study(
     skies = skies_for(weather, study.options.sampling, cache, **study.options.sky)
 
     def balance(systems: Mapping[str, States]) -> tuple[BalancedRooms, TracedRooms]:
-        traced = _traced_rooms(study, inputs, systems, skies, cache, progress)
-        rooms = _balanced(study, building, traced.rooms, weather, progress, in_windows=systems)
-        return rooms, traced
+        return balanced_rooms(study, replace(inputs, systems=systems), skies, cache, progress)
 
     found, traced = balance(in_windows)
     notes |= dict.fromkeys(traced.leaks)
@@ -391,13 +389,25 @@ def run_study(
         radiant = traced.radiants.get(room.space.guid)  # none of an air node
         if room.zone.view_factors is None and study.trace.view_factors:
             notes[f"{result.name}: is not closed, its longwave goes through a mean star."] = None
-        felt_result = _felt(study, room.zone, result, radiant)
+        felt_result = felt_in(study, room.zone, result, radiant)
         year = _year(study, room, felt_result, humidity, weather)
         if found.design is not None:
             own = found.design[found.design["room"] == room.zone.name]
             year = replace(year, design=own.reset_index(drop=True))
         years.append(year)
     return years, tuple(notes)
+
+
+def balanced_rooms(
+    study: StudyFile, inputs: Inputs, skies: AnnualSky, cache: MatrixCache | None = None, progress: Progress = silent
+) -> tuple[BalancedRooms, TracedRooms]:
+    """The rooms of a study with their heat balanced, and as they were before.
+
+    Args: inputs: of `study_inputs`; skies: of `skies_for`.
+    """
+    traced = _traced_rooms(study, inputs, inputs.systems, skies, cache, progress)
+    rooms = _balanced(study, inputs.building, traced.rooms, inputs.weather, progress, in_windows=inputs.systems)
+    return rooms, traced
 
 
 class TracedRooms(NamedTuple):
@@ -578,7 +588,8 @@ def _transfers(study: StudyFile, building: Building, names: Mapping[str, str], w
     return transfers
 
 
-def _felt(study: StudyFile, zone: Zone, result: ZoneResult, radiant: RadiantRoom | None) -> ZoneResult:
+def felt_in(study: StudyFile, zone: Zone, result: ZoneResult, radiant: RadiantRoom | None) -> ZoneResult:
+    """The result with the mean radiant and operative temperatures of the study's person."""
     person = study.comfort
     return felt(result, radiant, person.mean_radiant, _floor(zone), person.air_speed)
 

@@ -19,7 +19,8 @@ from scenes.room.glare import rating_of
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
 from scenes.room.operation import OperationHours
-from scenes.room.shading import MOST_COMBINATIONS, Levels, Seat, seat_view, shading_states, slat_tilts_deg
+from scenes.room.shading import Levels, shading_states, slat_tilts_deg
+from scenes.room.shading_by_light import MOST_COMBINATIONS, Seat, seat_view
 from scenes.room.solar import SeasonalOutdoors, SunByStates, window_irradiance
 from scenes.room.window_sensors import window_beam
 from scenes.room.zone import (

@@ -16,7 +16,7 @@ from mitsuba_cfs.progress import Progress, silent
 from scenes.room.control_year import ControlYear
 from scenes.room.operation import OperationHours
 from scenes.room.operation_tables import OperationTables
-from scenes.room.shading import Seat, view_taken
+from scenes.room.shading_by_light import Seat, view_taken
 from scenes.room.shading_rules import ShadingRule
 from scenes.room.zone import climate, lamp_daylight
 from thermal.predictive import Forecast, PredictedHours, PredictedYear, noisy_forecast, predicted_year

@@ -422,7 +422,7 @@ def run_inputs(
         weather.midpoints,
         sun,
         results,
-        (*building.issues, *issues, *leaks),
+        (*head.issues, *issues, *leaks),
         manifest,
         tuple(dict.fromkeys(notes)),
         room.method,

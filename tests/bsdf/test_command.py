@@ -13,12 +13,13 @@ from bim.radiance.cell import read_radiance_layer
 from mitsuba_cfs.bsdf.blinds import venetian_blind
 from mitsuba_cfs.bsdf.generate import generate_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_QUARTER, KlemsBsdf
-from mitsuba_cfs.bsdf.periodic import plastic, write_radiance
+from mitsuba_cfs.bsdf.periodic import plastic
 from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.spectra.detectors import NANOMETRES, visible_mean
 from scenes.commands.bsdf import command
 from scenes.fenestration.thermal_file import SpectralTable
+from tests.bsdf.radiance_cells import write_radiance
 from tests.conftest import OWN_BLIND
 
 POLYGON = " a polygon p 0 0 9 0 0 0 1 0 0 0 1 0"
