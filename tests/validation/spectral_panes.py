@@ -29,6 +29,7 @@ PANES = {
     "coated blue": ("nfrc_9962.json",),
     "coated blue, clear": ("nfrc_9962.json", "CLEAR_3.DAT"),
     "three green": ("913.json",) * 3,
+    "electrochromic at 6 %, clear": ("igsdb_product_7407.json", "CLEAR_3.DAT"),  # see `spectral.WINDOWS`
 }
 CELLS = 40  # of the window in each direction, whose middles are seen
 
@@ -42,6 +43,8 @@ def main(
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for name, files in PANES.items():
+        if not all((data / file).exists() for file in files):
+            continue
         window = Window([read_spectral_pane(data / file) for file in files])
         rays, sampled, own = _lights(window, divisions, gap)
         for s, point in enumerate(NAMES):

@@ -55,7 +55,9 @@
     return image(view, pixels, (i, out, at) => {
       coloured(found, tints, i, rgb);
       const luminance = 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2], scale = luminance > 0 ? curve(found.values[i]) / luminance : 0;
-      for (let k = 0; k < 3; k++) out[at + k] = srgb(Math.min(Math.max(scale * rgb[k], 0), 1));
+      // a colour too bright for the screen is mixed with grey of its luminance
+      const grey = scale * luminance, most = scale * Math.max(rgb[0], rgb[1], rgb[2]), share = most > 1 ? (1 - grey) / (most - grey) : 1;
+      for (let k = 0; k < 3; k++) out[at + k] = srgb(Math.min(Math.max(grey + share * (scale * rgb[k] - grey), 0), 1));
     });
   }
 
