@@ -2,6 +2,8 @@
 
 from .design.design import DesignResult as DesignResult, run_design as run_design
 from .design.design_file import Design as Design, read_design as read_design
+from .fit.fit import FitResult as FitResult, run_fit as run_fit
+from .fit.fit_file import Fit as Fit, read_fit as read_fit
 from .input_files import read_building as read_building
 from .fenestration.systems import FenestrationSystem as FenestrationSystem, read_system as read_system
 from .fenestration.tilts import tilt_states as tilt_states

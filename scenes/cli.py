@@ -83,6 +83,7 @@ COMMANDS = {
     "study": "Compare rooms, systems, orientations and climates of a study file.",
     "design": "Search the best system, sizes and rule of control for a room.",
     "site": "Compute daylight and sun that neighbours lose, and sun that glass reflects.",
+    "fit": "Fit inputs of a model to measured light or temperatures.",
     "pv": "Compute the yield of the photovoltaic modules of a building.",
     "calibrate": "Measure the computing time of each method on this machine.",
 }

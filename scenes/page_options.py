@@ -37,6 +37,7 @@ RunSection = Literal[
 ]
 StudySection = Literal["verdict", "comparison", "model", "problems", "method", "inputs", "glossary"]
 DesignSection = Literal["candidates", "search", "inputs"]
+FitSection = Literal["readings", "noise"]
 DossierSection = Literal["rooms", "problems", "sources"]
 GlareSection = Literal["worst", "seats", "views"]
 

@@ -192,3 +192,43 @@ def read_options(*tables: TomlTable) -> dict[str, object]:
     """The keys of these tables as options of `InputOptions`."""
     names = (*ReadTable.model_fields, *OutdoorTable.model_fields)
     return {name: getattr(table, name) for table in tables for name in names if name in type(table).model_fields}
+
+
+def set_key(table: Any, parts: list[str], value: Any, *, made: bool) -> None:
+    """Set a key down a path; a list without a number is all of its entries."""
+    first, *rest = parts
+    if isinstance(table, list | tuple):
+        if first.isdecimal():
+            if int(first) >= len(table):
+                raise DataError(f"there is no entry {first}: there are {len(table)}")
+            if not rest:
+                table[int(first)] = value
+                return
+            set_key(table[int(first)], rest, value, made=made)
+            return
+        if not table:
+            raise DataError(f"there is no entry to set {first!r} in")
+        for one in table:
+            set_key(one, parts, value, made=made)
+        return
+    if not rest:
+        table[first] = value
+        return
+    if table.get(first) is None:
+        if not made:
+            raise DataError(no_such_key(first, tuple(name for name, one in table.items() if one is not None)))
+        table[first] = {}
+    if isinstance(table[first], tuple):
+        table[first] = list(table[first])
+    set_key(table[first], rest, value, made=made)
+
+
+def with_absolute_files(value: Any, folder: Path) -> Any:
+    """A table whose texts that name files of a folder are their absolute paths."""
+    if isinstance(value, dict):
+        return {key: with_absolute_files(one, folder) for key, one in value.items()}
+    if isinstance(value, list):
+        return [with_absolute_files(one, folder) for one in value]
+    if isinstance(value, str) and value and (folder / value).is_file():
+        return str((folder / value).absolute())
+    return value

@@ -152,7 +152,15 @@ def test_the_system_and_operation_files_of_the_quick_start_are_read(folder):
 
 
 def test_the_page_of_the_quick_start_is_read(folder):
-    from scenes.page_options import DesignSection, DossierSection, GlareSection, RunSection, StudySection, read_page
+    from scenes.page_options import (
+        DesignSection,
+        DossierSection,
+        FitSection,
+        GlareSection,
+        RunSection,
+        StudySection,
+        read_page,
+    )
 
     text = (REPOSITORY / "docs" / "quickstart.md").read_text("utf-8")
     (code,) = [c for c in examples(REPOSITORY / "docs" / "quickstart.md", "toml") if "logo" in c]
@@ -163,6 +171,7 @@ def test_the_page_of_the_quick_start_is_read(folder):
         ("run", RunSection),
         ("study", StudySection),
         ("design", DesignSection),
+        ("fit", FitSection),
         ("comply", DossierSection),
         ("dgp", GlareSection),
     ):

@@ -285,14 +285,14 @@ def generate(out: Path, **options) -> None:
 
     A fabric is not traced: its BSDF follows from what a data sheet states (ES-SO, EN 14501).
 
-    Of coloured slats or sheets the light by wavelength goes into a CSV file beside --out.
+    Of coloured slats or sheets the light by wavelength goes into a JSON file beside --out.
     """
     from scenes.bsdf_generation import generated_file
     from scenes.commands.progress_bar import ProgressBar
     from scenes.fenestration.thermal_file import write_slat_light
 
     check_file(out, inputs=[options[name] for name in ("geometry", "product", "fabrics", "spectrum")])
-    of_slats = out.with_name(f"{out.stem}_slats.csv")
+    of_slats = out.with_name(f"{out.stem}_slats.json")
     if options["spectrum"] is not None or options["sheet_colour"] is not None:
         check_file(of_slats, inputs=[options["spectrum"]])
     with ProgressBar() as progress:

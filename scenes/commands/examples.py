@@ -47,6 +47,7 @@ EXAMPLES = {
         "cfs study study.toml --out study --method auto --time-budget 20min --dgp-error 10%",
     ),
     "design": ("cfs design design.toml --out design",),
+    "fit": ("cfs fit fit.toml --out fit",),
     "pv": ("cfs pv house.ifc --weather city.epw --study modules.toml --out yield",),
     "site neighbours": ("cfs site neighbours next-door.ifc --weather city.epw --proposed tower.glb --out site",),
     "site reflections": ("cfs site reflections house.ifc --weather city.epw --points street.csv --out site",),

@@ -91,13 +91,13 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
     rule = result.rules[verdict.rule]
     of_glare = any("glare" in need.parts for level in verdict.criterion.level for need in level.needs)
     if unknown and not rule.fits(result.weather):
-        parts.append(gettext("It asks for the weather of {sites}.", sites=", ".join(rule.sites)))
+        parts.append(gettext("It asks for the weather of {sites}.", sites=rule.weather_asked))
     elif unknown and of_glare and all(room.light is None or room.light.glare is None for room, _ in asked):
         parts.append(gettext("Annual glare was not asked for."))
     rated = [room.light.glare for room, _ in asked if room.light is not None and room.light.glare is not None]
     if rated and of_glare:
         operated = any(glare.operated for glare in rated)
-        blinds = gettext("blinds closed by the rule of LM-83") if operated else gettext("all blinds open")
+        blinds = translated(result.blinds) if operated else gettext("all blinds open")
         parts.append(gettext("Rated with {blinds}.", blinds=blinds))
     return " ".join(parts)
 

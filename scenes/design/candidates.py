@@ -10,14 +10,14 @@ from typing import Any, cast
 
 from pydantic import BaseModel
 
-from mitsuba_cfs.errors import DataError, no_such_key
+from mitsuba_cfs.errors import DataError
 from scenes.design.blinds import operation_text, states_of, with_slats, write_once
 from scenes.design.design_file import OWN, SYSTEM, Design, DesignSystem, VariableTable
 from scenes.quick import ROOM, picks
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.study.study_file import Study
-from scenes.toml_file import read_table, validated
+from scenes.toml_file import read_table, set_key, validated, with_absolute_files
 
 Point = tuple[float | int, ...]  # of each variable: the number of its option, or a number
 OPERATION = "operation"
@@ -155,46 +155,20 @@ def _set(table: dict[str, Any], own: dict[str, Any], operation: dict[str, Any], 
             raise DataError("there is no [[system]]")
         if rest.startswith("blind.") and own.get("blind") is None:
             return False
-        _reach(own, rest.split("."), value, made=False)
+        set_key(own, rest.split("."), value, made=False)
         return True
     if first == OPERATION and rest:
         if rest.partition(".")[0] == "control" and own and _one_state(own):
             return False
         operation[rest] = value
         return True
-    _reach(table, key.split("."), value, made=first == "options")
+    set_key(table, key.split("."), value, made=first == "options")
     return True
 
 
 def _one_state(own: Mapping[str, Any]) -> bool:
     """Whether a system has a single state, which no rule moves."""
     return own.get("bsdf") is not None or (bool(own.get("layers")) and own.get("blind") is None)
-
-
-def _reach(table: Any, parts: list[str], value: Any, *, made: bool) -> None:
-    """Set a key down a path; a list without a number is all of its entries."""
-    first, *rest = parts
-    if isinstance(table, list | tuple):
-        if first.isdecimal():
-            if int(first) >= len(table):
-                raise DataError(f"there is no entry {first}: there are {len(table)}")
-            _reach(table[int(first)], rest, value, made=made)
-            return
-        if not table:
-            raise DataError(f"there is no entry to set {first!r} in")
-        for one in table:
-            _reach(one, parts, value, made=made)
-        return
-    if not rest:
-        table[first] = value
-        return
-    if table.get(first) is None:
-        if not made:
-            raise DataError(no_such_key(first, tuple(name for name, one in table.items() if one is not None)))
-        table[first] = {}
-    if isinstance(table[first], tuple):
-        table[first] = list(table[first])
-    _reach(table[first], rest, value, made=made)
 
 
 def _shape_windows(table: dict[str, Any]) -> None:
@@ -234,18 +208,7 @@ def _operated(
 
 def _base(path: Path | None) -> dict[str, Any]:
     """An operation file as it stands, the files that it names with absolute paths."""
-    return {} if path is None else _absolute(read_table(path), path.parent)
-
-
-def _absolute(value: Any, folder: Path) -> Any:
-    """A table whose texts that name files of a folder are their absolute paths."""
-    if isinstance(value, dict):
-        return {key: _absolute(one, folder) for key, one in value.items()}
-    if isinstance(value, list):
-        return [_absolute(one, folder) for one in value]
-    if isinstance(value, str) and value and (folder / value).is_file():
-        return str((folder / value).absolute())
-    return value
+    return {} if path is None else with_absolute_files(read_table(path), path.parent)
 
 
 def _write_operation(
@@ -254,7 +217,7 @@ def _write_operation(
     """The operation file of a candidate."""
     table = deepcopy(base)
     for key, value in changes.items():
-        _reach(table, key.split("."), value, made=True)
+        set_key(table, key.split("."), value, made=True)
     if system is not None and system.blind is not None:
         table["control"] = with_slats(table.get("control", LOWERED), system.blind)
     _validated(OperationTables, table)

@@ -30,10 +30,10 @@ class HeatFiles:
         return self.inputs.weather
 
 
-def read_files(study: StudyFile, file: Path | None = None) -> HeatFiles:
+def read_files(study: StudyFile, file: Path | None = None, *, weather: Weather | None = None) -> HeatFiles:
     """Weather and shading states of a study; its box is checked too.
 
-    Args: file: the study's own, for messages.
+    Args: file: the study's own, for messages; weather: of the study, where it is read already.
 
     Raises: `DataError` for what cannot be used.
     """
@@ -42,7 +42,9 @@ def read_files(study: StudyFile, file: Path | None = None) -> HeatFiles:
         from scenes.heat.box import box_building  # geometry: only where there is one
 
         box_building(study.box)
-    if study.measured is None:
+    if weather is not None:
+        pass
+    elif study.measured is None:
         weather = read_weather(study.weather)
         if study.heat_island is not None:
             weather = study.heat_island.warmed(weather, file)

@@ -58,7 +58,7 @@ def read_measured(path: Path, table: MeasuredTable) -> Weather:
         data = pd.read_csv(path)
     except (OSError, UnicodeDecodeError, ValueError) as error:
         raise DataError(f"cannot be read: {reason(error)}", file=path) from error
-    times = _times(data, table.time, path)
+    times = interval_ends(data, table.time, path)
     step = _step(times, path)
     names = table.columns.model_dump(exclude_none=True)
     values = {key: _column(data, name, path) for key, name in names.items()}
@@ -106,9 +106,10 @@ def _with_sun(weather: Weather, values: dict[str, FloatArray], path: Path) -> We
     return replace(weather, direct_normal=np.minimum(normal, STRONGEST))
 
 
-def _times(data: pd.DataFrame, column: str, path: Path) -> pd.DatetimeIndex:
+def interval_ends(data: pd.DataFrame, column: str, path: Path) -> pd.DatetimeIndex:
+    """The times [H] of a column; `DataError` where it is missing or holds anything else."""
     if column not in data.columns:
-        raise DataError(_missing(column, data), file=path, field="time")
+        raise DataError(no_column(column, data), file=path, field="time")
     try:
         times = pd.DatetimeIndex(pd.to_datetime(data[column], format="ISO8601"))
     except (ValueError, TypeError) as error:
@@ -135,7 +136,7 @@ def _step(times: pd.DatetimeIndex, path: Path) -> pd.Timedelta:
 
 def _column(data: pd.DataFrame, name: str, path: Path) -> FloatArray:
     if name not in data.columns:
-        raise DataError(_missing(name, data), file=path, field="columns")
+        raise DataError(no_column(name, data), file=path, field="columns")
     values = pd.to_numeric(data[name], errors="coerce").to_numpy(dtype=float)
     wrong = np.flatnonzero(~np.isfinite(values))
     if wrong.size:
@@ -144,5 +145,6 @@ def _column(data: pd.DataFrame, name: str, path: Path) -> FloatArray:
     return values
 
 
-def _missing(name: str, data: pd.DataFrame) -> str:
+def no_column(name: str, data: pd.DataFrame) -> str:
+    """The message on a column that there is not."""
     return f"no column {name!r}; there are {', '.join(map(str, data.columns))}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,6 +41,7 @@ from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.leaks import leak_issues
 from scenes.room.light import visible_scene
 from scenes.room.operation import (
+    Operation,
     OperationHours,
     check_schedules,
     ground_note,
@@ -49,6 +51,7 @@ from scenes.room.operation import (
 )
 from scenes.room.operation_tables import PlantTable
 from scenes.room.room import operated_zone
+from scenes.room.shared_states import with_shared_states
 from scenes.room.zone import RoomZone, balances, coupled, inner_sun_note
 from thermal.balance import ZoneResult
 from thermal.comfort import (
@@ -363,9 +366,7 @@ def run_study(
     skies = skies_for(weather, study.options.sampling, cache, **study.options.sky)
 
     def balance(systems: Mapping[str, States]) -> tuple[BalancedRooms, TracedRooms]:
-        traced = _traced_rooms(study, inputs, systems, skies, cache, progress)
-        rooms = _balanced(study, building, traced.rooms, weather, progress, in_windows=systems)
-        return rooms, traced
+        return balanced_rooms(study, replace(inputs, systems=systems), skies, cache, progress)
 
     found, traced = balance(in_windows)
     notes |= dict.fromkeys(traced.leaks)
@@ -388,13 +389,25 @@ def run_study(
         radiant = traced.radiants.get(room.space.guid)  # none of an air node
         if room.zone.view_factors is None and study.trace.view_factors:
             notes[f"{result.name}: is not closed, its longwave goes through a mean star."] = None
-        felt_result = _felt(study, room.zone, result, radiant)
+        felt_result = felt_in(study, room.zone, result, radiant)
         year = _year(study, room, felt_result, humidity, weather)
         if found.design is not None:
             own = found.design[found.design["room"] == room.zone.name]
             year = replace(year, design=own.reset_index(drop=True))
         years.append(year)
     return years, tuple(notes)
+
+
+def balanced_rooms(
+    study: StudyFile, inputs: Inputs, skies: AnnualSky, cache: MatrixCache | None = None, progress: Progress = silent
+) -> tuple[BalancedRooms, TracedRooms]:
+    """The rooms of a study with their heat balanced, and as they were before.
+
+    Args: inputs: of `study_inputs`; skies: of `skies_for`.
+    """
+    traced = _traced_rooms(study, inputs, inputs.systems, skies, cache, progress)
+    rooms = _balanced(study, inputs.building, traced.rooms, inputs.weather, progress, in_windows=inputs.systems)
+    return rooms, traced
 
 
 class TracedRooms(NamedTuple):
@@ -414,7 +427,18 @@ def _traced_rooms(
     progress: Progress,
 ) -> TracedRooms:
     """The rooms with these systems."""
-    traced = TracedRooms([], {}, [])
+    traced, building = TracedRooms([], {}, []), inputs.building
+    operation = with_shared_states(
+        Operation(study.building or Path(building.name), study, ()),
+        building,
+        inputs.spaces,
+        in_windows,
+        inputs.weather,
+        study.options,
+        skies=skies,
+        cache=cache,
+        progress=progress,
+    )
     for i, space in enumerate(inputs.spaces):
         steps = item(progress, "room", i + 1, len(inputs.spaces), space.label)
         room = room_inputs(
@@ -427,6 +451,7 @@ def _traced_rooms(
             skies=skies,
             cache=cache,
             together=[one.guid for one in inputs.spaces] if study.couple else (),
+            shared=None if operation is None else operation.shared,
         )
         if space.windows:
             scene, seed = visible_scene(room), study.options.sampling.seed
@@ -563,7 +588,8 @@ def _transfers(study: StudyFile, building: Building, names: Mapping[str, str], w
     return transfers
 
 
-def _felt(study: StudyFile, zone: Zone, result: ZoneResult, radiant: RadiantRoom | None) -> ZoneResult:
+def felt_in(study: StudyFile, zone: Zone, result: ZoneResult, radiant: RadiantRoom | None) -> ZoneResult:
+    """The result with the mean radiant and operative temperatures of the study's person."""
     person = study.comfort
     return felt(result, radiant, person.mean_radiant, _floor(zone), person.air_speed)
 
@@ -594,7 +620,7 @@ def study_inputs(study: StudyFile, files: HeatFiles | None = None, progress: Pro
     files, options = files or read_files(study), study.inputs
     building = building_or_box(study.box, options, progress)
     rooms = "all" if study.couple or study.box is not None else "glazed"
-    inputs = inputs_of(building, options, files.inputs, rooms=rooms, states=every_state)
+    inputs = inputs_of(building, options, files.inputs, rooms=rooms, states=every_state, tables=study)
     notes = *stated_note(building, "the study"), *unstated_note(study, building, "the study")
     inputs = replace(inputs, notes=(*notes, *ground_note(study)))
     return replace(inputs, spaces=shared_constructions(inputs.spaces)) if study.couple else inputs

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -189,7 +189,12 @@ def read_study(path: Path, *, quick: bool = False) -> StudyFile:
 
     Raises: `DataError` naming the file and the field.
     """
-    study = schedules_there(validated(StudyFile, read_table(path), path), path)
+    return study_of(read_table(path), path, quick=quick)
+
+
+def study_of(table: dict[str, Any], path: Path, *, quick: bool = False) -> StudyFile:
+    """The study of a table that was read from a file, as of `read_study`."""
+    study = schedules_there(validated(StudyFile, table, path), path)
     here = path.parent
     systems = tuple(
         s.placed(here).model_copy(update={"bsdf": s.bsdf and _there(here, s.bsdf, path)}) for s in study.system

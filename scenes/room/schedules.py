@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from difflib import get_close_matches
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -253,11 +254,10 @@ def _number(date: str) -> int:
 def _column(path: Path, column: str, hours: int) -> FloatArray:
     """A column of numbers [H] of a CSV file."""
     try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = list(csv.DictReader(file))
+        stamp = path.stat()
+        names, rows = _csv_rows(path, stamp.st_mtime_ns, stamp.st_size)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DataError(f"cannot be read: {reason(error)}", file=path) from error
-    names = [name for name in (rows[0] if rows else {}) if name]
     if column not in names:
         raise DataError(f"no column {column!r}; there are {', '.join(names)}", file=path)
     if len(rows) != hours:
@@ -273,3 +273,11 @@ def _column(path: Path, column: str, hours: int) -> FloatArray:
     if not np.isfinite(values).all():
         raise DataError("expected finite numbers", file=path, field=column)
     return values
+
+
+@lru_cache(maxsize=4)  # schedules of a study are columns of few files
+def _csv_rows(path: Path, changed: int, size: int) -> tuple[list[str], list[dict[str, Any]]]:
+    """Column names and rows of a file that has not changed since: `changed`, `size`."""
+    with path.open(encoding="utf-8-sig", newline="") as file:
+        rows = list(csv.DictReader(file))
+    return [name for name in (rows[0] if rows else {}) if name], rows

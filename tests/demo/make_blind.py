@@ -2,7 +2,7 @@
 
 Each is an XML file with a `.toml` beside it: `glazing`, `venetian_blind`.
 
-    python -m scenes.demo.make_blind
+    python -m tests.demo.make_blind
 
 The blind is that of the dissertation: slats 80 mm deep, of 104 mm radius, 72 mm apart, 55 % grey
 with 1 % gloss of roughness 0.06, here at 45 degrees; its BSDF is traced by this project's virtual
@@ -11,8 +11,6 @@ the third surface; its values at normal incidence are those usual for such panes
 """
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 
@@ -23,8 +21,8 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.layers import LayeredSystem, combine_layers
 from mitsuba_cfs.bsdf.periodic import plastic
 from mitsuba_cfs.bsdf.xml import BsdfFile, write_bsdf_xml
+from scenes.demo import FOLDER
 
-FOLDER = Path(__file__).parent
 BLIND = plastic("55 % grey", 0.55, specular=0.01, roughness=0.06)
 TILT_DEG = 45.0
 PANES = {  # outer, inner: normal transmittance, front and back reflectance
@@ -88,7 +86,7 @@ def thermal_values(system: LayeredSystem, resistances: tuple[float, ...], total:
     u_value = 1 / total
     names = ("blind", "outer pane", "inner pane")[-len(resistances) :]
     lines = [
-        "# written by scenes/demo/make_blind.py",
+        "# written by tests/demo/make_blind.py",
         f"u_value = {u_value:.3f}  # [W/(m2 K)]"
         + (" with the blind's air layer, EN 13363-1" if "blind" in names else ""),
         f"g_value = {g[0]:.4f}  # at normal incidence (Klems patch 0)",

@@ -1,0 +1,1 @@
+"""Inputs of a model fitted to measured illuminance, luminance or temperatures."""
