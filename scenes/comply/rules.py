@@ -139,6 +139,15 @@ def _named(weather: Weather, words: Iterable[str]) -> bool:
     return any(word.casefold() in text for word in words for text in texts)
 
 
+# Editions after those of the rule files, by a part of their plain name, and the rule that is here
+NOT_AVAILABLE = {
+    "lm8322": ("ANSI/IES LM-83-22", "lm83"),
+    "leedv5": ("LEED v5", "leed-v4.1"),
+    "breeamv7": ("BREEAM New Construction version 7", "breeam-hea01"),
+    "breeam7": ("BREEAM New Construction version 7", "breeam-hea01"),
+}
+
+
 def rule_names() -> tuple[str, ...]:
     """Names of the rules that come with the program."""
     return tuple(sorted(Path(str(one)).stem for one in FOLDER.iterdir() if one.name[-5:] == ".toml"))
@@ -152,11 +161,25 @@ def rule_named(name: str) -> str:
     plain = _plain(name)
     found = [rule for rule in rule_names() if _plain(rule) == plain]
     found = found or [rule for rule in rule_names() if plain and _plain(rule).startswith(plain)]
+    found = found or [rule for rule in rule_names() if len(plain) > 3 and _is_edition(plain, read_rule(rule).edition)]
     if len(found) == 1:
         return found[0]
+    for later, (edition, earlier) in NOT_AVAILABLE.items():
+        if not found and later in plain:
+            raise DataError(
+                f"{edition} is not included: neither its text nor a source of its limits was available; {earlier} is "
+                "the latest edition here; write the limits of your copy into a rule file (docs/comply.md)",
+                field="--standard",
+            )
     known = ", ".join(found or rule_names())
     message = f"{name!r} may be each of {known}" if found else f"no rule {name!r}; there are {known}, and files"
     raise DataError(message, field="--standard")
+
+
+def _is_edition(plain: str, edition: str) -> bool:
+    """Whether a plain name is an edition without its publisher, or without its last amendment."""
+    whole = _plain(edition)
+    return whole.startswith(plain) or whole.endswith(plain)
 
 
 def _plain(name: str) -> str:

@@ -372,3 +372,24 @@ def test_melanopic_light_of_lamps_needs_their_spectrum(calendar):
     late = EyeDays(what="eye_days", lux=100, hours=2, begins_by=10, at_least=1.0)
     assert late.value(eye_light(calendar, [0] * 10 + [200] * 14)) == 1.0
     assert late.value(eye_light(calendar, [0] * 11 + [200] * 13)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("written", "rule"),
+    [
+        ("LM-83-12", "lm83"),
+        ("IES LM-83-12", "lm83"),
+        ("EN 17037:2018+A1:2021", "en17037"),
+        ("EN 17037:2018", "en17037"),
+    ],
+)
+def test_an_edition_is_a_name_of_its_rule(written, rule):
+    assert rule_named(written) == rule
+
+
+@pytest.mark.parametrize(
+    ("written", "here"), [("LEED v5", "leed-v4.1"), ("ANSI/IES LM-83-22", "lm83"), ("BREEAM v7", "breeam-hea01")]
+)
+def test_a_later_edition_is_said_not_to_be_included(written, here):
+    with pytest.raises(DataError, match=f"not included: neither its text .* {here} is the latest edition here"):
+        rule_named(written)

@@ -38,8 +38,10 @@ addEventListener("load", () => setTimeout(() => {
     }));
   }
   const texts = ".tick, .x-ticks span, .scale-ticks span, .card *";
+  // what a row of plans shows when it is scrolled sideways is not cut off
+  const inRow = (e) => { const row = e.closest(".plans"); return row && getComputedStyle(row).overflowX === "auto"; };
   report.clipped = [...document.querySelectorAll(texts)]
-    .filter((e) => e.offsetParent && (box(e).left < -0.5 || box(e).right > report.width + 0.5))
+    .filter((e) => e.offsetParent && !inRow(e) && (box(e).left < -0.5 || box(e).right > report.width + 0.5))
     .map((e) => e.textContent);
   const click = (id) => document.getElementById(id).click();
   const choose = (id, value) => {

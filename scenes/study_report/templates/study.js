@@ -51,3 +51,16 @@
   }
   show(sections[0].dataset.case);
 })();
+
+// Sections for reference are folded on a phone, never on paper or where a link leads into one
+(() => {
+  "use strict";
+  const folds = [...document.querySelectorAll("details.fold")];
+  const open = (all) => { for (const one of all) one.open = true; };
+  if (matchMedia("(max-width: 40rem)").matches) for (const one of folds) one.open = false;
+  addEventListener("beforeprint", () => open(folds));
+  addEventListener("hashchange", () => {
+    const target = document.getElementById(location.hash.slice(1));
+    if (target) open(target.querySelectorAll(":scope > details.fold"));
+  });
+})();
