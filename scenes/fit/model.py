@@ -120,7 +120,9 @@ class FittedModel:
             last = np.flatnonzero(np.diff(block, append=len(block)))
             column = MeasuredColumn(one, steps, block, np.empty(0), np.empty(0), times[steps[last]])
             if len(steps):
-                column = replace(column, values=column.means(values[steps]), hours=column.means(steps * step_h))
+                column = replace(
+                    column, values=column.means(values[steps]), hours=column.means(step_h * steps.astype(np.float64))
+                )
             self.columns.append(column)
         light = [column.steps for column in self.columns if column.light]
         self._lit_steps = np.unique(np.concatenate(light)) if light else np.empty(0, dtype=np.int64)
