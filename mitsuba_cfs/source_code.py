@@ -111,15 +111,15 @@ def _file(name: str, root: Path) -> Path | None:
     return next((f for f in (stem / "__init__.py", stem.with_suffix(".py")) if f.is_file()), None)
 
 
-_distributions = cache(metadata.packages_distributions)  # the files of all packages are listed for it
+# Packages that are imported by another name than they are installed by; `metadata.packages_distributions`
+# knows all, but reads the file lists of all installed packages for it
+_DISTRIBUTIONS = {"PIL": "pillow", "colour": "colour-science", "sklearn": "scikit-learn"}
 
 
 @cache
 def _installed(package: str) -> str:
-    """The version of another package, by the name it is imported as."""
+    """The version of another package, by the name it is imported as; empty if it is not installed."""
     try:
-        return metadata.version(package)
+        return metadata.version(_DISTRIBUTIONS.get(package, package))
     except metadata.PackageNotFoundError:
-        pass
-    names = _distributions().get(package, ())
-    return " ".join(f"{name} {metadata.version(name)}" for name in sorted(set(names)))
+        return ""

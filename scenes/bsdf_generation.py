@@ -35,6 +35,7 @@ from scenes.fenestration.thermal_file import read_reflectance, reflectance_of_co
 SHEETS = ("venetian", "louvre", "perforated", "woven", "pleated")  # shapes of one material
 # shares of the largest reflectance at which coloured sheets are traced: zeros of Chebyshev's polynomial and the ends
 LEVELS = (1 - np.cos(np.linspace(0, np.pi, 5))) / 2
+LEAST_SHARE = 1e-9  # of the largest value, below which a pair of patches passes nothing
 BASES = {"full": klems.KLEMS_FULL, "half": klems.KLEMS_HALF, "quarter": klems.KLEMS_QUARTER}
 
 
@@ -104,8 +105,8 @@ def generated_file(
     slats = None
     if reflectance is not None:
         of_levels = result.bsdf[2:]
-        slats = slat_light([area[:, 0] @ one.transmission_front for one in of_levels], levels, reflectance)
         systems = (visible_bsdf(of_levels, levels, reflectance), systems[1])
+        slats = slat_light([one.transmission_front for one in of_levels], levels, reflectance)
     exact += "".join(f"\nnote: {note}" for note in notes)
     bands = dict(zip(("Visible", "Solar"), systems, strict=True))
     file = BsdfFile(bands, name=name or options["shape"], thickness=layer.thickness)
@@ -119,12 +120,21 @@ def generated_file(
 def slat_light(
     passed: Sequence[NDArray[np.float64]], levels: Sequence[float], reflectance: NDArray[np.float64]
 ) -> SlatLight:
-    """Transmittance by wavelength of sheets of a reflectance [N], from that at a few reflectances.
+    """Colour of the light of sheets of a reflectance [N], from what they pass at a few reflectances.
 
-    Args: passed: [K] at each level; levels: reflectances, 0 first, the largest last.
+    That is a polynomial of the reflectance, whose coefficients are the numbers of reflections; the
+    highest has those beyond it too.
+
+    Args: passed: [K out, K in] at each level; levels: reflectances, 0 first, the largest last.
     """
-    whole = BarycentricInterpolator(np.array(levels), np.array(passed))(reflectance).T
-    return SlatLight(passed[0], np.clip(whole, passed[0][:, None], 1.0))
+    most, blocks = max(levels), np.array(passed)
+    scaled = np.linalg.inv(np.vander(np.array(levels) / most, increasing=True))
+    orders = np.tensordot(scaled, blocks, 1)  # [n, K, K] of (rho / most)^n, between the slats first
+    mean = visible_mean((reflectance / most) ** np.arange(len(levels))[:, None])
+    visible = np.tensordot(mean, orders, 1)
+    lit = visible > LEAST_SHARE * blocks.max(axis=(1, 2))[-1]
+    shares = mean[1:, None, None] * orders[1:]
+    return SlatLight(reflectance, np.divide(shares, visible, out=np.zeros_like(shares), where=lit))
 
 
 def visible_bsdf(systems: Sequence[KlemsBsdf], levels: Sequence[float], reflectance: NDArray[np.float64]) -> KlemsBsdf:

@@ -11,11 +11,12 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
-from difflib import get_close_matches
 from importlib import import_module, metadata
 from types import FrameType
 
 import click
+
+from scenes.commands.examples import CommandGroup, with_examples
 
 
 class _Stream(io.FileIO):
@@ -81,6 +82,7 @@ COMMANDS = {
     "thermal": "Compute hourly gains, temperatures, loads and comfort of rooms (heat only).",
     "study": "Compare rooms, systems, orientations and climates of a study file.",
     "design": "Search the best system, sizes and rule of control for a room.",
+    "site": "Compute daylight and sun that neighbours lose, and sun that glass reflects.",
     "fit": "Fit inputs of a model to measured light or temperatures.",
     "pv": "Compute the yield of the photovoltaic modules of a building.",
     "calibrate": "Measure the computing time of each method on this machine.",
@@ -109,7 +111,7 @@ class Terminated(BaseException):
         super().__init__(number)
 
 
-class LazyGroup(click.Group):
+class LazyGroup(CommandGroup):
     """A group that imports a subcommand's module only when that subcommand is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -120,19 +122,7 @@ class LazyGroup(click.Group):
         """The subcommand, imported now; None if there is no such one."""
         if cmd_name not in COMMANDS:
             return None
-        from scenes.commands.examples import with_examples
-
         return with_examples(import_module(f"scenes.commands.{cmd_name}").command, cmd_name)
-
-    def resolve_command(
-        self, ctx: click.Context, args: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        """As click's; the error of an unknown name says which commands are near."""
-        near = get_close_matches(args[0], COMMANDS, n=2)
-        if args[0] not in COMMANDS and near:
-            hint = " or ".join(f"'{name}'" for name in near)
-            ctx.fail(f"No such command {args[0]!r}. (Did you mean {hint}?)")
-        return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the subcommands by the table, without importing them."""

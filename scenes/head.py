@@ -158,7 +158,50 @@ def head_of(
         *system_notes(used, light_only=light_only),
         *([] if weather is None else [*weather.notes, *site_notes(building, weather)]),
     ]
-    return Head(model_lines(building), building.issues, _once(assumed), model_notes(building))
+    issues = issues_of(building, spaces)
+    elsewhere = len(building.issues) - len(issues)
+    others = [
+        Note(
+            "{count} problems of rooms that are not computed are not listed: cfs check lists them",
+            "{count} problem of rooms that are not computed is not listed: cfs check lists it",
+            count=elsewhere,
+        )
+    ]
+    model = (*model_lines(building), *(others if elsewhere else ()))
+    return Head(model, issues, _once(assumed), model_notes(building, issues))
+
+
+def issues_of(building: Building, spaces: Sequence[Space] = ()) -> tuple[Issue, ...]:
+    """The issues that concern these rooms or the whole model: not those of the other rooms alone.
+
+    Args: spaces: all where empty.
+    """
+    chosen = {space.guid for space in spaces or building.spaces}
+    used = {guid for space in building.spaces if space.guid in chosen for guid in _guids(space)}
+    others = {guid for space in building.spaces if space.guid not in chosen for guid in _guids(space)} - used
+    labels = {space.label: space.guid in chosen for space in building.spaces}
+    return tuple(
+        issue
+        for issue in building.issues
+        if issue.where not in others and _names_one(issue.values.get("rooms"), labels)
+    )
+
+
+def _names_one(rooms: object, chosen: Mapping[str, bool]) -> bool:
+    """Whether rooms that an issue names by their labels are chosen ones in part; True where it names none."""
+    if not isinstance(rooms, tuple) or not rooms or not all(room in chosen for room in rooms):
+        return True
+    return any(chosen[room] for room in rooms)
+
+
+def _guids(space: Space) -> Iterable[str]:
+    """A room, its windows and the building elements that bound it."""
+    yield space.guid
+    for window in space.windows:
+        yield window.guid
+    for face in space.faces:
+        if face.element is not None:
+            yield face.element
 
 
 def model_lines(building: Building) -> tuple[str, ...]:
@@ -210,11 +253,11 @@ def _with_glass(line: Note, area: float) -> Note:
     return Note("{line} ({area:.2f} m2 of glass)", line=line, area=area) if area else line
 
 
-def model_notes(building: Building) -> tuple[str, ...]:
+def model_notes(building: Building, issues: Iterable[Issue]) -> tuple[str, ...]:
     """Why the model cannot be used, what was joined, and what no result depends on."""
     account = building.account
     verdict = account.lines[:1] if account is not None and account.verdict == NOT_USABLE else ()
-    issues = (issue for issue in building.issues if issue.severity == "unused" or issue.code in NOTED)
+    issues = (issue for issue in issues if issue.severity == "unused" or issue.code in NOTED)
     return (*verdict, *map(issue_note, issues))
 
 
@@ -262,13 +305,22 @@ def site_notes(building: Building, weather: Weather) -> tuple[str, ...]:
     if max(abs(north), abs(east)) <= FAR_SITE_DEG:
         return ()
     note = Note(
-        "The site of the building ({north:.1f} N, {east:.1f} E) is far from the weather station "
-        "{station} ({station_north:.1f} N, {station_east:.1f} E); the solar positions are those of "
-        "the weather station.",
-        north=building.latitude_deg,
-        east=building.longitude_deg,
+        "The site of the building ({building}) is far from the weather station {station} ({position}); "
+        "the solar positions are those of the weather station.",
+        building=_position(building.latitude_deg, building.longitude_deg),
         station=weather.site,
-        station_north=weather.latitude_deg,
-        station_east=weather.longitude_deg,
+        position=_position(weather.latitude_deg, weather.longitude_deg),
     )
     return (note,)
+
+
+def _position(latitude_deg: float, longitude_deg: float) -> Note:
+    """Latitude and longitude in words."""
+    north, east = abs(float(latitude_deg)), abs(float(longitude_deg))
+    if latitude_deg >= 0 and longitude_deg >= 0:
+        return Note("{north:.1f}° N, {east:.1f}° E", north=north, east=east)
+    if latitude_deg >= 0:
+        return Note("{north:.1f}° N, {east:.1f}° W", north=north, east=east)
+    if longitude_deg >= 0:
+        return Note("{north:.1f}° S, {east:.1f}° E", north=north, east=east)
+    return Note("{north:.1f}° S, {east:.1f}° W", north=north, east=east)

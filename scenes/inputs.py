@@ -25,6 +25,7 @@ from scenes.fenestration.tilts import tilt_note
 from scenes.head import Head, head_of
 from scenes.input_files import InputFiles, building_of, named_files, read_files
 from scenes.input_options import NO_OPTIONS, InputOptions
+from scenes.room.control_groups import shared_groups
 from scenes.room.operation import (
     Operation,
     check_schedules,
@@ -108,6 +109,7 @@ def inputs_of(
     inner: bool = False,
     fill: bool = True,
     heat_of: RoomOptions | None = None,
+    tables: OperationTables | None = None,
 ) -> Inputs:
     """The inputs of a command, of a building that was read or made.
 
@@ -119,6 +121,8 @@ def inputs_of(
         fill: whether the command needs to know what fills the windows.
         heat_of: options of rooms whose heat the command balances; their gains and leaks hold
             without an operation.
+        tables: rules of the shading; by default those of the operation. The rooms that rules of several
+            rooms read are filled too.
 
     Raises: `DataError` for a room that is not in the building, a window that nothing fills.
     """
@@ -134,6 +138,9 @@ def inputs_of(
         spaces = chosen_spaces(building, options.rooms, file, lambda s: bool(s.windows or beyond.get(s.guid)))
     spaces = spaces[:1] if rooms == "first" else spaces
     traced = {s.guid: s for space in spaces for s in (space, *beyond.get(space.guid, ()))}
+    tables = operation.tables if tables is None and operation is not None else tables
+    for group in () if tables is None else shared_groups(building, tables, spaces):
+        traced |= {space.guid: space for space in group.sensor_rooms}
     windows = [window for space in traced.values() for window in space.windows]
     filled = fill_windows(windows, overrides, building.file) if fill else {}
     if operation is not None:

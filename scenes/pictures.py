@@ -88,7 +88,7 @@ def tone_mapped(pixels: NDArray[Any], *, white: float | None = None) -> NDArray[
     """sRGB bytes [ny, nx, 3] of radiance [ny, nx, 3] or luminance [ny, nx].
 
     The log-average becomes middle grey; what is `white` times brighter (default: the 99.5th
-    percentile) and more becomes white.
+    percentile) and more becomes white.  A colour too bright for the screen is paler, in its hue.
 
     Source: Reinhard et al. (2002), Photographic tone reproduction, global operator (4).
     """
@@ -99,8 +99,15 @@ def tone_mapped(pixels: NDArray[Any], *, white: float | None = None) -> NDArray[
         linear = np.repeat(mapped[..., None], 3, axis=-1)
     else:
         ratio = np.divide(mapped, luminance, where=luminance > 0, out=np.zeros_like(mapped))
-        linear = EFFICACY * pixels * ratio[..., None]
+        linear = _shown(EFFICACY * pixels * ratio[..., None], mapped[..., None])
     return _srgb(linear)
+
+
+def _shown(linear: NDArray[Any], luminance: NDArray[Any]) -> NDArray[Any]:
+    """Linear sRGB [ny, nx, 3] of 1 at most, mixed with as much grey of its luminance [ny, nx, 1] as that takes."""
+    most = linear.max(axis=-1, keepdims=True)
+    share = np.where(most > 1.0, (1.0 - luminance) / np.maximum(most - luminance, 1e-12), 1.0)
+    return np.asarray(luminance + share * (linear - luminance))
 
 
 def _luminance(pixels: NDArray[Any]) -> NDArray[Any]:

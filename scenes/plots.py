@@ -117,7 +117,7 @@ DECADES = 4  # of the colour scale, below the largest value
 def plot_hemispheres(bsdf: Bsdf, incident: NDArray[np.float64], title: str) -> Figure:
     """Figure of the BSDF [1/sr] by outgoing direction; `incident` [3] in the window frame.
 
-    Seen from outside: up is up, right is right, polar angle as radius.
+    Both hemispheres are seen from outdoors: up is up, right is right, polar angle as radius.
     """
     theta = np.radians(np.arange(THETA_STEP_DEG / 2, 90, THETA_STEP_DEG))
     phi = np.radians(np.arange(0, 360, PHI_STEP_DEG) + PHI_STEP_DEG / 2)
@@ -146,7 +146,7 @@ def plot_hemispheres(bsdf: Bsdf, incident: NDArray[np.float64], title: str) -> F
         axis.plot(at, theta_deg, marker, mfc="none", mec="cyan", ms=9, label=label)
         axis.legend(loc="lower left", bbox_to_anchor=(-0.15, -0.1))
     figure.colorbar(shown, ax=axes, label="BSDF [1/sr]", shrink=0.85)
-    figure.suptitle(f"{title}; seen from outside")
+    figure.suptitle(title)
     return figure
 
 

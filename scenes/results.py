@@ -19,6 +19,7 @@ from scenes.fenestration.peaks import lobe_notes
 from scenes.head import NO_HEAD, Head
 
 if TYPE_CHECKING:
+    from bim.energyplus_twin import EnergyPlusTwin
     from mitsuba_cfs.picture_year.year import PictureYear
 
 # Columns with three phases, see `mitsuba_cfs.methods.sun_by_patches`
@@ -379,6 +380,7 @@ class RunResult:
     notes: tuple[str, ...] = field(default=())  # sentences for the head of the results
     method: str = "three-phase"  # one of mitsuba_cfs.methods.METHODS
     head: Head = NO_HEAD  # what was left out, what was assumed
+    twin: EnergyPlusTwin | None = None  # the rooms as an EnergyPlus model, where it was asked for
 
     def __repr__(self) -> str:
         return f"<RunResult {self.building.name!r}: {len(self.spaces)} rooms, {self.method}>"

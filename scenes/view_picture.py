@@ -118,7 +118,8 @@ def write_picture(picture: RoomPicture, path: Path, *, print_like: bool = False)
 
         write_exr(path, pixels, picture.view, comment=title)
     elif path.suffix == ".png" and (print_like or pixels.ndim == 3):
-        write_tone_mapped(path, pixels, scale=True, title=title)
+        white = "; white balance: daylight outdoors" * (pixels.ndim == 3)
+        write_tone_mapped(path, pixels, scale=True, title=title + white)
     elif path.suffix == ".png":
         seen = pixel_directions(picture.view)[1]
         write_falsecolour(path, picture.luminance, title=title, seen=seen)

@@ -41,6 +41,7 @@ NO_EVIDENCE = {
     "app.md": {"| file | content | read by |"},
     "studies.md": {"| in the folder | what |", "| event | what is done |"},
     "pv.md": {"| key | meaning |"},
+    "site.md": {"| in the folder of results | quantity | met if |"},
 }
 ONCE = {"benchmarks.md", "evidence_reliability.md", "reliability.md"}  # pages that say it once, for all of their tables
 

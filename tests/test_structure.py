@@ -53,7 +53,7 @@ RANKS = {
         {"run", "viewed_room", "picture_options"},
         {"explore"},
         {"comply", "heat", "calibration", "picture_files", "photovoltaics", "simulation", "year_of_glare"},
-        {"fit", "study", "view_picture"},
+        {"fit", "study", "view_picture", "site"},
         {"study_report"},
         {"design"},
         {"app"},

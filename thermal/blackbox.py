@@ -293,12 +293,6 @@ def conductance_table(mean_c: ArrayLike, difference: ArrayLike, conductance: Arr
     return LayerResistance("table", tuple(float(c) for c in (*head, *np.ravel(conductance))))
 
 
-def as_surface(resistance: LayerResistance) -> LayerResistance:
-    """A "table" as the "surface" nearest to it in its usual range, -10 to 40 degC and up to 30 K."""
-    mean, difference = (v.ravel() for v in np.meshgrid(np.arange(-10.0, 40.1, 5.0), np.arange(1.0, 30.1, 1.0)))
-    return fit_conductance_surface(mean, difference, resistance.at(mean, difference))
-
-
 def with_realised_films(
     plain: Fenestration, *, r_inner_realised: float | None = None, r_outer_realised: float | None = None
 ) -> Fenestration:

@@ -77,7 +77,7 @@ class Closure:
     realised_inner_resistance: float | None = None  # [m2 K/W], see `with_realised_films`
     realised_outer_resistance: float | None = None
     slope: float = SLOPE  # of U for "linear" [1/K]
-    surface: tuple[float, ...] | None = None  # six coefficients of 1/R, for "surface"
+    surface: LayerResistance | None = None  # for "surface"
     unit: GlazingUnit | None = None  # for "layers"; for "typical" and "gap" by `with_typical`
 
     def __post_init__(self) -> None:
@@ -85,7 +85,7 @@ class Closure:
         require(self.u_model in U_MODELS, "u_model", f"{self.u_model!r} is not of {known}")
         for model, value, what in (
             ("gap", self.gap, "the data of a gap"),
-            ("surface", self.surface, "the coefficients of a surface"),
+            ("surface", self.surface, "the resistance by temperature"),
         ):
             fits = (self.u_model == model) == (value is not None)
             require(fits, "u_model", f'"{model}" and {what} belong together')
@@ -127,7 +127,7 @@ class Closure:
         if self.u_model == "linear":
             closed = replace(closed, resistance=linear_u(closed.u_value, slope=self.slope))
         if self.surface is not None:
-            closed = replace(closed, resistance=LayerResistance("surface", self.surface))
+            closed = replace(closed, resistance=self.surface)
         if data is not None and self.unit is not None:
             place, ends = self.unit.shade_place, (self.unit.layers[0], self.unit.layers[-1])
             closed = replace(

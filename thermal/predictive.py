@@ -35,9 +35,9 @@ class PredictedHours:
     """What acts on a zone in the hours of a year, in M combinations of window states."""
 
     sun: FloatArray  # [H, M] absorbed indoors [W]
-    daylight: FloatArray  # [H, M] on the work plane [lx]
+    daylight: FloatArray  # [H, M, Z] at the sensors of the lamps' zones [lx]
     lamps: FloatArray  # [H] full power [W]
-    dimming: Dimming | None  # by the daylight; None: they are not dimmed
+    zones: tuple[tuple[float, Dimming | None], ...]  # [Z] share of the lamps; dimmed by the daylight, None: not
     internal: FloatArray  # [H] other heat indoors [W]
     penalty: FloatArray  # [H, M] [Wh] of glare, or of a preference
     counts: tuple[int, ...] = ()  # [N] states of the groups, whose product is M; the last is fast
@@ -117,12 +117,11 @@ def predicted_year(
                 zone.area,
                 zone.heating_limit,
                 zone.cooling_limit,
-                hours.dimming is not None,
                 *weights,
                 start_c,
-                *(hours.dimming or Dimming(1.0)).numbers,
             ]
         ),
+        np.array([(share, one is not None, *(one or Dimming(1.0)).numbers) for share, one in hours.zones]),
         zone.windows,
         zone.air,
         zone.outdoor_c,
@@ -152,19 +151,27 @@ _lamp_share = compiled()(lamp_share)
 @compiled()
 def _hour(
     constants: NDArray[np.float64],
+    zones: NDArray[np.float64],
     windows: float,
     air: float,
     outdoor_c: float,
     behind_c: float,
     sun: float,
-    daylight: float,
+    daylight: NDArray[np.float64],
+    scale: float,
     lamps: float,
     internal: float,
     out: NDArray[np.float64],
 ) -> float:
-    """Write the `responses` of a combination into out [6]; returns the power of its lamps."""
-    if constants[6] > 0:
-        lamps *= _lamp_share(daylight, constants[11], constants[12], constants[13], constants[14], constants[15])
+    """Write the `responses` of a combination into out [6]; returns the power of its lamps.
+
+    Args: zones: [Z, 7] of the lamps: share, whether dimmed, `Dimming.numbers`; scale: of the daylight.
+    """
+    share = 0.0
+    for z in range(len(zones)):
+        of, dims, needed, read, least_light, least_power, off = zones[z]
+        share += of * (_lamp_share(scale * daylight[z], needed, read, least_light, least_power, off) if dims else 1.0)
+    lamps *= share
     responses(
         air,
         windows,
@@ -234,6 +241,7 @@ def _groups_apart(a: int, b: int, counts: NDArray[np.int64]) -> int:
 @compiled()
 def _run(
     constants: NDArray[np.float64],
+    zones: NDArray[np.float64],
     windows: NDArray[np.float64],
     air: NDArray[np.float64],
     outdoor_c: NDArray[np.float64],
@@ -257,7 +265,7 @@ def _run(
     """Carry out the plans of the year: state, heating, cooling and lamps into result [H, 4]."""
     H, M = sun.shape
     step = (WARMEST_C - COLDEST_C) / (STEPS - 1)
-    out, mass_c = np.zeros(6), constants[10]
+    out, mass_c = np.zeros(6), constants[9]
     kinds = M if move > 0.0 else 1  # combinations in the hour before that count
     kept = np.zeros((H + 1 if once else ahead + 1, kinds, STEPS))
     last_m = 0
@@ -275,22 +283,24 @@ def _run(
                 for m in range(M):
                     lit = _hour(
                         constants,
+                        zones,
                         windows[m],
                         air[at],
                         outdoor_c[known] + more,
                         behind_c[known] + more,
                         scale * sun[known, m],
-                        scale * daylight[known, m],
+                        daylight[known, m],
+                        scale,
                         lamps[at],
                         internal[at],
                         out,
                     )
-                    base = constants[9] * lit + penalty[at if shift == 0 else known, m]
+                    base = constants[8] * lit + penalty[at if shift == 0 else known, m]
                     kind = m if kinds > 1 else 0
                     for k in range(STEPS):
                         temperature = COLDEST_C + k * step
                         power = _power(temperature, out, low[at], high[at], constants)
-                        cost = constants[7] * power if power > 0 else -constants[8] * power
+                        cost = constants[6] * power if power > 0 else -constants[7] * power
                         after = out[3] + out[4] * temperature + out[5] * power
                         cost += base + _value(kept[t + 1, kind], after)
                         if cost < kept[t, kind, k]:
@@ -303,21 +313,23 @@ def _run(
         for m in range(M):
             lit = _hour(
                 constants,
+                zones,
                 windows[m],
                 air[hour],
                 outdoor_c[hour],
                 behind_c[hour],
                 sun[hour, m],
                 daylight[hour, m],
+                1.0,
                 lamps[hour],
                 internal[hour],
                 out,
             )
             power = _power(mass_c, out, low[hour], high[hour], constants)
-            cost = constants[7] * power if power > 0 else -constants[8] * power
+            cost = constants[6] * power if power > 0 else -constants[7] * power
             after = out[3] + out[4] * mass_c + out[5] * power
             kind = m if kinds > 1 else 0
-            cost += constants[9] * lit + penalty[hour, m] + _value(ahead_values[kind], after)
+            cost += constants[8] * lit + penalty[hour, m] + _value(ahead_values[kind], after)
             if kinds > 1:
                 cost += move * _groups_apart(last_m, m, counts)
             if cost < best:

@@ -26,7 +26,6 @@ ROUGHNESS = {  # DOE-2 roughness multiplier R_f; EnergyPlus Engineering Referenc
     "very smooth": 1.0,
 }
 OUTSIDE_ABSORPTANCE = 0.6  # solar, of what faces outdoors where nothing is known
-OUTSIDE = ("outdoor", "ground", "known", "adiabatic", "twin")
 
 
 @dataclass(frozen=True, slots=True)

@@ -571,7 +571,11 @@ def guessed_walls(spaces: Sequence[Space]) -> list[Issue]:
                 "area": area,
                 "u": 1 / (sum(layer.resistance for layer in layers) + SURFACES),
                 "layers": tuple(
-                    f"{1000 * layer.thickness:.0f} mm {layer.name} ({layer.conductivity:.3g} W/mK)" for layer in layers
+                    Phrase(
+                        "layer",
+                        {"mm": 1000 * layer.thickness, "name": layer.name, "conductivity": float(layer.conductivity)},
+                    )
+                    for layer in layers
                 ),
             },
         )

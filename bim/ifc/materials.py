@@ -14,7 +14,7 @@ from bim.ifc.damage import Damage, entities, instances, placement_of
 from bim.ifc.project import length_scale
 from bim.material_names import MaterialCorrection, NamedMaterial, material_named
 from bim.model import MaterialLayer
-from bim.report.issue import Issue, Phrase
+from bim.report.issue import Issue, Phrase, Term
 
 PHYSICAL = {  # name -> lowest and highest value of any building material
     "conductivity": (0.005, 500.0),
@@ -225,7 +225,7 @@ class MaterialReader:
             known: dict[str, Any] = {
                 "material": name,
                 "missing": tuple(map(Phrase, missing)),
-                "default": default.layer.name,
+                "default": Term(default.layer.name),
                 "impossible": tuple(Phrase("impossible-value", {"name": Phrase(k), "value": stated[k]}) for k in wrong),
             }
             code = "material-unknown" if unknown else "material-incomplete"

@@ -92,14 +92,14 @@ def north_rotation(
         return np.eye(3), issues or [Issue("true-north-missing", "project")]
     if true is None:
         return _turned(*grid), [*issues, Issue("true-north-from-map", "IfcMapConversion")]
-    difference = (_azimuth(true) - _azimuth(grid) + 180.0) % 360.0 - 180.0
+    difference = (true_north_deg(true) - true_north_deg(grid) + 180.0) % 360.0 - 180.0
     if abs(difference) <= CONVERGENCE_DEG:
         return _turned(*true), issues
-    values = {"map": _azimuth(grid), "true": _azimuth(true), "difference": abs(difference)}
+    values = {"map": true_north_deg(grid), "true": true_north_deg(true), "difference": abs(difference)}
     return _turned(*grid), [*issues, Issue("north-contradicts-map", "IfcMapConversion", values)]
 
 
-def _azimuth(north: tuple[float, float]) -> float:
+def true_north_deg(north: tuple[float, float]) -> float:
     """Direction of the model's +y axis, from north to east [deg]."""
     return math.degrees(math.atan2(-north[0], north[1])) + 0.0
 

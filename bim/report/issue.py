@@ -48,6 +48,13 @@ class Template(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
+class Term:
+    """A name of a table of the program, such as of a default material, as a value of an issue."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
 class Phrase:
     """A phrase of the catalogue, as a value of an issue."""
 
@@ -74,7 +81,7 @@ class Issue:
 
     code: str  # a key of the catalogue, such as "window-without-room"
     where: str  # GUID or name of the element, or the file
-    values: Mapping[str, str | int | float | tuple[str | Phrase, ...] | Phrase] = field(
+    values: Mapping[str, str | int | float | tuple[str | Phrase, ...] | Phrase | Term] = field(
         default_factory=dict, hash=False
     )  # named values of the templates
     effect: Effect = Effect()
@@ -177,11 +184,14 @@ def templates() -> tuple[str, ...]:
 
 def _words(value: object, fill: Fill) -> object:
     """A value as the templates take it: phrases and lists as text, numbers as they are."""
+    if isinstance(value, Term):
+        return fill(value.name)
     if isinstance(value, Phrase):
         words = {key: _words(one, fill) for key, one in value.values.items()}
         return fill(phrases()[value.key], _tables()["phrase"].get(f"{value.key}-one", ""), **words)
     if isinstance(value, tuple):
-        listed = ", ".join(str(_words(one, fill)) for one in value[:LISTED])
+        parts = {f"part_{n}": _words(one, fill) for n, one in enumerate(value[:LISTED])}
+        listed = fill(", ".join(f"{{{key}}}" for key in parts), **parts)
         if len(value) <= LISTED:
             return listed
         return fill(phrases()["more"], names=listed, count=len(value) - LISTED)

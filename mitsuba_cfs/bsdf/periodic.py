@@ -6,15 +6,13 @@ In the window frame: x to the right seen from outside, y up, z outwards [m].  On
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from os import PathLike
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.errors import check_number, check_type
-from mitsuba_cfs.files import replacing
 
 
 @dataclass(frozen=True)
@@ -129,49 +127,3 @@ class PeriodicLayer:
         ]
         copies = np.concatenate([self.triangles + np.array(shift) for shift in shifts])
         return copies, np.tile(self.material, len(shifts))
-
-
-def stacked(layers: list[PeriodicLayer], gaps: list[float]) -> PeriodicLayer:
-    """Layers in series as one layer, the exterior one first, all on cells of one size.
-
-    Args:
-        gaps: clear distance between neighbouring layers [m].
-    """
-    if len(gaps) != len(layers) - 1 or min(gaps, default=1) <= 0:
-        raise ValueError("expected a positive gap between each two layers")
-    if len({layer.period for layer in layers}) != 1:
-        raise ValueError("the layers' cells are of different sizes")
-    triangles, material = [], []
-    materials: tuple[SlatMaterial, ...] = ()
-    top = 0.0
-    for layer, gap in zip(layers, [*gaps, 0.0], strict=True):
-        triangles.append(layer.triangles + np.array([0, 0, top - layer.depth_range[1]]))
-        material.append(layer.material + len(materials))
-        materials += layer.materials
-        top -= layer.thickness + gap
-    return PeriodicLayer(np.concatenate(triangles), np.concatenate(material), materials, layers[0].period)
-
-
-def write_radiance(layer: PeriodicLayer, path: str | PathLike[str], columns: int, rows: int) -> None:
-    """Write columns x rows cells as a Radiance scene for genBSDF.
-
-    In Radiance's BSDF frame: x to the left, y up, z into the room, all of the layer at z <= 0.
-    """
-    triangles, material = layer.tile(columns, rows)
-    triangles = triangles - [0.0, 0.0, layer.depth_range[0]]
-    with replacing(path) as part, open(part, "w", encoding="ascii") as file:
-        file.writelines(_radiance_lines(layer, triangles * [-1, 1, -1], material))
-
-
-def _radiance_lines(layer: PeriodicLayer, triangles: NDArray[np.float64], material: NDArray[np.int64]) -> Iterator[str]:
-    for index, sheet in enumerate(layer.materials):
-        alike = sheet.reflectance_front == sheet.reflectance_back
-        if sheet.transmittance or sheet.index or sheet.straight or sheet.back_is_black or not alike:
-            raise ValueError(f"material {sheet.name}: only opaque sheets alike on both sides")
-        colour = np.array(sheet.reflectance_front) / (1 - sheet.specular)
-        red, green, blue = colour if len(colour) == 3 else (colour[0],) * 3
-        yield f"void plastic m{index} 0 0 5 {red:.9g} {green:.9g} {blue:.9g} "
-        yield f"{sheet.specular:.9g} {sheet.roughness:.9g}\n"
-    for index, (corners, sheet) in enumerate(zip(triangles, material, strict=True)):
-        numbers = " ".join(f"{value:.9g}" for value in corners.ravel())
-        yield f"m{sheet} polygon p{index} 0 0 9 {numbers}\n"

@@ -23,38 +23,33 @@ PATCH_ANGLES = 32  # angles of incidence in each patch, for its mean
 
 @dataclass(frozen=True, slots=True)
 class SlatLight:
-    """Transmittance of coloured slats by patch of incidence of the full Klems basis and wavelength."""
+    """Colour of the light of coloured slats, by direction and number of reflections.
 
-    straight: Array  # [K] of what black slats pass: light between them, which has no colour
-    whole: Array  # [K, N] at `NANOMETRES`, with what the slats reflect
+    Of the visible light from a patch of incidence to a patch of the room side a share was
+    reflected n times: its spectrum is rho^n.  The rest passed between the slats.
+    """
+
+    reflectance: Array  # [N] of the slats at `NANOMETRES`
+    shares: Array  # [n, K out, K in] of visible light, once reflected first; full Klems basis
 
     def __post_init__(self) -> None:
-        shape = KLEMS_FULL.size, len(NANOMETRES)
-        if self.straight.shape != shape[:1] or self.whole.shape != shape:
-            raise ValueError(f"slats: expected {shape[0]} patches and {shape[1]} wavelengths, got {self.whole.shape}")
+        if self.reflectance.shape != (len(NANOMETRES),) or self.shares.shape[1:] != (KLEMS_FULL.size,) * 2:
+            raise ValueError(
+                f"slats: expected {KLEMS_FULL.size} x {KLEMS_FULL.size} patches and {len(NANOMETRES)} wavelengths, "
+                f"got {self.shares.shape[1:]} and {self.reflectance.shape}"
+            )
 
-    @property
-    def straight_share(self) -> Array:
-        """Share of visible light that passes between the slats [K]; 1 where none passes."""
-        return _relative(self.straight, self.straight + visible_mean(self._reflected))
-
-    @property
-    def _reflected(self) -> Array:
-        reflected: Array = np.maximum(self.whole - self.straight[:, None], 0.0)
-        return reflected
-
-    def relative(self, channels: Channels) -> tuple[Array, Array]:
-        """r_c of all light and of the reflected part alone [C, K]."""
-        visible, means = visible_mean(self._reflected), channels.mean(self._reflected).T
-        return _relative(self.straight + means, self.straight + visible), _relative(means, visible)
+    def relative(self, channels: Channels) -> Array:
+        """r_c of light that is reflected 1, 2, .. times [n, C]."""
+        powers = self.reflectance ** (1 + np.arange(len(self.shares)))[:, None]
+        return _relative(channels.mean(powers), visible_mean(powers)[:, None])
 
 
 class PatchFactors(NamedTuple):
-    """r_c of patches of incidence [C, K]."""
+    """r_c of patches of incidence."""
 
-    whole: Array  # of all light that a system passes
-    scattered: Array  # of what does not pass straight on
-    straight: Array  # of what does
+    straight: Array  # [C, K] of all light; with coloured slats of what they do not reflect
+    reflected: Array  # [n, C, K] of what slats reflect 1, 2, .. times; empty without coloured ones
 
 
 @dataclass(frozen=True)
@@ -99,10 +94,23 @@ class SpectralFactor:
         visible: Array = visible_mean(self.transmittance)
         return visible
 
+    @staticmethod
+    def of_diffuse_light(factors: Sequence[SpectralFactor], amounts: Sequence[float]) -> SpectralFactor:
+        """That of the mean diffuse light of several systems, at all angles.
+
+        Args: amounts: of visible light that each passes.
+        """
+        weight = np.sin(2 * ANGLES)
+        spectra = [weight @ one.transmittance for one in factors]
+        parts = [amount * spectrum / visible_mean(spectrum) for amount, spectrum in zip(amounts, spectra, strict=True)]
+        return SpectralFactor(np.tile(np.sum(parts, axis=0), (len(ANGLES), 1)))
+
     def of_angles(self, channels: Channels) -> Array:
-        """r_c at `ANGLES` [C, A]."""
+        """r_c at `ANGLES` [1 + n, C, A]: of light that passes straight on, that slats reflect 1, 2, .. times."""
         ratio: Array = _relative(channels.mean(self.transmittance), self.visible[:, None]).T
-        return ratio
+        if self.slats is None:
+            return ratio[None]
+        return np.concatenate([ratio[None], ratio * self.slats.relative(channels)[..., None]])
 
     def rgb(self) -> Array:
         """Linear sRGB [A, 3] of D65 through it at `ANGLES`, over its luminance; none negative."""
@@ -119,9 +127,8 @@ class SpectralFactor:
         means = [np.interp(theta, ANGLES, row).mean(axis=1) for row in channels.mean(self.transmittance).T]
         panes = _relative(np.array(means), visible)
         if self.slats is None:
-            return PatchFactors(panes, panes, panes)
-        whole, reflected = self.slats.relative(channels)
-        return PatchFactors(panes * whole, panes * reflected, panes)
+            return PatchFactors(panes, np.empty((0, *panes.shape)))
+        return PatchFactors(panes, panes * self.slats.relative(channels)[..., None])
 
 
 def _relative(means: Array, visible: Array) -> Array:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ from mitsuba_cfs.methods.window_reflection import (
     with_exchange_of,
 )
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.kernels.path_options import PathOptions
 from mitsuba_cfs.trace.kernels.scattering import patch_beams
 from mitsuba_cfs.trace.matrices.adjacent import adjacent_view
 from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
@@ -147,7 +149,10 @@ def _straight_view(matrices: PhaseMatrices, optics: SystemOptics, g: int, beam: 
     """B and B_d of a group in a state; None where the method takes none."""
     if not beam.any():
         return None
-    scene, chosen, stopping = matrices.scene, matrices.sampling, Stopping(batches=BATCHES)
+    scene, chosen = matrices.scene, matrices.sampling
+    paths = partial(
+        PathOptions, stopping=Stopping(batches=BATCHES), seed=chosen.seed, cache=matrices.cache, scenes=matrices.scenes
+    )
     inner = g - len(scene.outdoor_groups)
     if inner >= 0:  # nothing comes straight from the sky
         values = adjacent_view(
@@ -156,12 +161,7 @@ def _straight_view(matrices: PhaseMatrices, optics: SystemOptics, g: int, beam: 
             beam,
             matrices.adjacent[inner],
             scene.sensors(),
-            samples=INNER_SHARE * chosen.sensor_samples // BATCHES,
-            max_depth=INDOOR_DEPTH,
-            stopping=stopping,
-            seed=chosen.seed,
-            cache=matrices.cache,
-            scenes=matrices.scenes,
+            paths(INNER_SHARE * chosen.sensor_samples // BATCHES, INDOOR_DEPTH),
         )
         return StraightView(values, np.zeros_like(values.values) if matrices.five_phase else None)
     if not has_sharp_beam(matrices, g):
@@ -175,13 +175,8 @@ def _straight_view(matrices: PhaseMatrices, optics: SystemOptics, g: int, beam: 
             scene.groups,
             scattering,
             *scene.sensors(),
+            paths=paths(max(chosen.sensor_samples // BATCHES, 1), depth),
             subdivision=chosen.subdivision,
-            samples=max(chosen.sensor_samples // BATCHES, 1),
-            max_depth=depth,
-            stopping=stopping,
-            seed=chosen.seed,
-            cache=matrices.cache,
-            scenes=matrices.scenes,
         )
         return matrix.part(np.s_[g])
 

@@ -57,7 +57,7 @@ from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
-from mitsuba_cfs.trace.kernels.scattering import patch_beams, through_beams
+from mitsuba_cfs.trace.kernels.scattering import Scattering, patch_beams, through_beams
 from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
 from mitsuba_cfs.trace.sun.specular_paths import shining
 
@@ -192,7 +192,8 @@ def with_sensor_light(light: PhaseLight, *, progress: Progress = silent) -> Phas
         sensors = [list(map(SensorLight, group)) for group in coefficients]
     else:
         hours = shining_hours(light)
-        suns = _direct_sun(light, chosen, hours, progress)
+        ways = [[o.scattering for o in in_state(chosen, [j] * len(chosen))] for j in range(max(map(len, chosen)))]
+        suns = direct_sun(light, ways, hours, progress=progress)
         reflected = _reflected_to_sensors(light, coefficients)
         sensors = [
             [_sensor_light(light, one, g, reflected.get((g, j)), (suns[j], hours)) for j, one in enumerate(group)]
@@ -403,26 +404,29 @@ def direct_sun_of_all(light: PhaseLight, kind: Sequence[int], hours: NDArray[np.
     return _total([sensors[g][j].sun for g, j in enumerate(kind)])[:, hours]
 
 
-def _direct_sun(
-    light: PhaseLight, systems: Sequence[States], hours: NDArray[np.int64], progress: Progress
+def direct_sun(
+    light: PhaseLight,
+    scattering: Sequence[Sequence[Scattering | None]],
+    hours: NDArray[np.int64],
+    *,
+    progress: Progress = silent,
 ) -> list[Estimate | None]:
     """C_ds [J][G, S, h] of the hours in which the sun shines on a window; None without any.
 
-    Args: systems: states of each group that are traced [G][J].
+    Args: scattering: of the groups in each state that is traced [J][G]; None leaves a group out.
     """
-    states = max(map(len, systems))
+    states = len(scattering)
     if not len(hours):
         return [None] * states
     scene, chosen = light.scene, light.matrices.sampling
     matrices: list[Estimate | None] = []
-    for j in range(states):
-        scattering = [o.scattering for o in in_state(systems, [j] * len(scene.groups))]
+    for j, ways in enumerate(scattering):
         matrices.append(
             direct_sun_matrix(
                 scene.interior,
                 scene.exterior,
                 scene.groups,
-                scattering,
+                ways,
                 *scene.sensors(),
                 suns=light.sky.direction[hours],
                 window_points=max(chosen.sun_points // SUN_BATCHES, 1),

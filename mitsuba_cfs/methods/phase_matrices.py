@@ -28,9 +28,10 @@ from mitsuba_cfs.methods.scene import AdjacentRoom, DaylightScene, Sampling
 from mitsuba_cfs.methods.subdivision import CellLight, Parts, allowed, subdivided
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
-from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup
+from mitsuba_cfs.surfaces import SharedOutdoors, SurfaceGroups, Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, joined
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
+from mitsuba_cfs.trace.kernels.path_options import PathOptions
 from mitsuba_cfs.trace.kernels.rooms import TracedRoom
 from mitsuba_cfs.trace.kernels.scene import SceneCache
 from mitsuba_cfs.trace.matrices.adjacent import (
@@ -41,8 +42,8 @@ from mitsuba_cfs.trace.matrices.adjacent import (
     window_exchange,
 )
 from mitsuba_cfs.trace.matrices.daylight import BATCHES as CELL_BATCHES
-from mitsuba_cfs.trace.matrices.daylight import cell_daylight, cells_of_rooms, daylight_matrix, daylight_of_rooms
-from mitsuba_cfs.trace.matrices.view import RoomViews, view_matrix, views_of_rooms
+from mitsuba_cfs.trace.matrices.daylight import cells_of_rooms, daylight_of_rooms
+from mitsuba_cfs.trace.matrices.view import RoomViews, views_of_rooms
 from mitsuba_cfs.trace.pictures.adjacent import RoomShown, adjacent_picture
 from mitsuba_cfs.trace.pictures.annual import ViewMatrices, ViewNoise, view_matrices
 from mitsuba_cfs.trace.sun.sunlit_rows import (
@@ -237,10 +238,9 @@ def matrices_together(
     """
     shared = SceneCache()
     shared.know_fronts(outdoors, [scene.exterior for scene in scenes])
-    common: dict[str, Any] = {"cache": cache, "scenes": shared}
     parts = [Parts.whole(scene.groups) for scene in scenes]
     if cut:
-        parts = _parts_together(scenes, outdoors, sampling, common)
+        parts = _parts_together(scenes, outdoors, sampling, cache, shared)
     progress("daylight of several rooms", 0.2)
     passes = [(OUTDOOR_DEPTH, False), *([(1, False)] if five_phase else [])]
     if five_phase and outdoors.surfaces.glossy:
@@ -248,11 +248,19 @@ def matrices_together(
     fronts = [
         TracedRoom(one.exterior, of.groups, number=i) for i, (one, of) in enumerate(zip(scenes, parts, strict=True))
     ]
-    options = [
-        _daylight_options(sampling, len(one.groups), len(of.groups)) for one, of in zip(scenes, parts, strict=True)
+    paths = [
+        _daylight_paths(sampling, len(one.groups), len(of.groups), OUTDOOR_DEPTH, cache, shared)
+        for one, of in zip(scenes, parts, strict=True)
     ]
     whole, *direct = (
-        _daylight_together(fronts, outdoors, options, depth, plain=plain, common=common) for depth, plain in passes
+        _daylight_together(
+            fronts,
+            outdoors,
+            [replace(of, max_depth=depth) for of in paths],
+            plain=plain,
+            subdivision=sampling.subdivision,
+        )
+        for depth, plain in passes
     )
     progress("daylight of several rooms", 0.5)
     matrices = []
@@ -272,57 +280,60 @@ def matrices_together(
                 scenes=shared,
             )
         )
-    rooms = [TracedRoom(one.scene.interior, one.parts.groups, *sensors_of(*one.scene.sensors())) for one in matrices]
+    rooms = [_sensor_room(one) for one in matrices]
     sharp = [any(has_sharp_beam(one, g) for g in range(len(one.scene.groups))) for one in matrices]
     by_groups = [one.scene.by_groups for one in matrices if one.scene.by_groups is not None]
-    views = views_of_rooms(
-        rooms, max_depth=INDOOR_DEPTH, with_direct=any(sharp), by_groups=by_groups, **_view_options(sampling), **common
-    )
+    paths_indoors = _view_paths(sampling, INDOOR_DEPTH, cache, shared)
+    views = views_of_rooms(rooms, paths_indoors, with_direct=any(sharp), by_groups=by_groups)
     progress("daylight of several rooms", 1.0)
     return [_with_views(one, of_room) for one, of_room in zip(matrices, views, strict=True)]
 
 
 def _parts_together(
-    scenes: Sequence[DaylightScene], outdoors: SharedOutdoors, sampling: Sampling, common: dict[str, Any]
+    scenes: Sequence[DaylightScene],
+    outdoors: SharedOutdoors | None,
+    sampling: Sampling,
+    cache: MatrixCache | None,
+    traced: SceneCache,
 ) -> list[Parts]:
     """The window groups of each room, cut where the view outdoors differs within a group."""
-    cells = [[window_cells(group) for group in one.groups] for one in scenes]
+    cells = [[window_cells(group) for group in one.outdoor_groups] for one in scenes]
     daylight = cells_of_rooms(
-        [TracedRoom(one.exterior, one.groups, number=i) for i, one in enumerate(scenes)],
+        [TracedRoom(one.exterior, one.outdoor_groups, number=i) for i, one in enumerate(scenes)],
         outdoors,
         cells,
-        [_cell_samples(sampling, of) for of in cells],
-        max_depth=OUTDOOR_DEPTH,
-        seed=sampling.seed,
-        **common,
+        [
+            PathOptions(_cell_samples(sampling, of), OUTDOOR_DEPTH, None, sampling.seed, silent, cache, traced)
+            for of in cells
+        ],
     )
     return [
-        _parts_of_cells(one.groups, of, light, sampling) for one, of, light in zip(scenes, cells, daylight, strict=True)
+        _parts_of_cells(one.outdoor_groups, of, light, sampling)
+        for one, of, light in zip(scenes, cells, daylight, strict=True)
     ]
 
 
 def _daylight_together(
     rooms: Sequence[TracedRoom],
     outdoors: SharedOutdoors,
-    options: Sequence[dict[str, Any]],
-    depth: int,
+    paths: Sequence[PathOptions],
     *,
     plain: bool,
-    common: dict[str, Any],
+    subdivision: int,
 ) -> list[Estimate]:
-    """D of each room; those with equal options are traced together.
+    """D of each room; those with as many paths are traced together.
 
     Args: plain: without the gloss of what is outdoors.
     """
     if plain:
         rooms = [replace(one, surfaces=replace(one.surfaces, gloss=())) for one in rooms]
         outdoors = replace(outdoors, surfaces=replace(outdoors.surfaces, gloss=()))
-    alike: dict[str, list[int]] = {}
-    for i, chosen in enumerate(options):
-        alike.setdefault(repr(chosen), []).append(i)
+    alike: dict[object, list[int]] = {}
+    for i, of in enumerate(paths):
+        alike.setdefault((of.samples, of.stopping), []).append(i)
     estimates: dict[int, Estimate] = {}
     for some in alike.values():
-        traced = daylight_of_rooms([rooms[i] for i in some], outdoors, max_depth=depth, **options[some[0]], **common)
+        traced = daylight_of_rooms([rooms[i] for i in some], outdoors, paths[some[0]], subdivision=subdivision)
         estimates |= dict(zip(some, traced, strict=True))
     return [estimates[i] for i in range(len(rooms))]
 
@@ -388,16 +399,13 @@ def as_five_phase(matrices: PhaseMatrices) -> PhaseMatrices:
     matrices = with_direct_daylight(replace(matrices, five_phase=True))
     if matrices.sensors is None or matrices.direct_sensors is not None:
         return matrices
-    direct = view_matrix(
-        matrices.scene.interior,
-        matrices.parts.groups,
-        *matrices.scene.sensors(),
-        max_depth=1,
-        cache=matrices.cache,
-        scenes=matrices.scenes,
-        **_view_options(matrices.sampling),
-    )
-    return replace(matrices, direct_sensors=direct.values)
+    (direct,) = views_of_rooms([_sensor_room(matrices)], _paths_indoors(matrices, depth=1))
+    return replace(matrices, direct_sensors=direct.whole.values)
+
+
+def _sensor_room(matrices: PhaseMatrices) -> TracedRoom:
+    """The scene's room with its sensors."""
+    return TracedRoom(matrices.scene.interior, matrices.parts.groups, *sensors_of(*matrices.scene.sensors()))
 
 
 def has_sharp_beam(matrices: PhaseMatrices, g: int) -> bool:
@@ -416,17 +424,12 @@ def with_sensors(matrices: PhaseMatrices, *, progress: Progress = silent) -> Pha
     if matrices.sensors is not None:
         return matrices
     known = matrices.direct_sensors
-    room = TracedRoom(matrices.scene.interior, matrices.parts.groups, *sensors_of(*matrices.scene.sensors()))
     (views,) = views_of_rooms(
-        [room],
+        [_sensor_room(matrices)],
+        _paths_indoors(matrices, progress=part(progress, 0.3, 1.0, "daylight")),
         by_groups=() if matrices.scene.by_groups is None else (matrices.scene.by_groups,),
-        max_depth=INDOOR_DEPTH,
         with_direct=known is None and any(has_sharp_beam(matrices, g) for g in range(len(matrices.scene.groups))),
         direct=known,
-        progress=part(progress, 0.3, 1.0, "daylight"),
-        cache=matrices.cache,
-        scenes=matrices.scenes,
-        **_view_options(matrices.sampling),
     )
     whole = _with_views(matrices, views)
     return whole if known is None else replace(whole, direct_sensors=known)
@@ -441,15 +444,21 @@ def _with_views(matrices: PhaseMatrices, views: RoomViews) -> PhaseMatrices:
     )
 
 
-def _window_exchange(matrices: PhaseMatrices, **options: Any) -> Estimate:
+def _paths_indoors(matrices: PhaseMatrices, depth: int = INDOOR_DEPTH, progress: Progress = silent) -> PathOptions:
+    return replace(_view_paths(matrices.sampling, depth, matrices.cache, matrices.scenes), progress=progress)
+
+
+def _exchange_paths(matrices: PhaseMatrices, parts: Sequence[WindowGroup], share: int, depth: int) -> PathOptions:
+    """Paths of each patch between windows: fewer the more windows there are."""
+    samples = max(matrices.sampling.patch_samples // share // len(parts), 8)
+    seed = matrices.sampling.seed
+    return PathOptions(samples, depth, Stopping(batches=2), seed, silent, matrices.cache, matrices.scenes)
+
+
+def _window_exchange(matrices: PhaseMatrices, by_groups: SurfaceGroups | None = None) -> Estimate:
     parts = matrices.parts.groups
-    return window_exchange(
-        matrices.scene.interior,
-        parts,
-        samples=_exchange_samples(matrices.sampling, parts, EXCHANGE_SHARE),
-        max_depth=INDOOR_DEPTH,
-        **options,
-    )
+    paths = _exchange_paths(matrices, parts, EXCHANGE_SHARE, INDOOR_DEPTH)
+    return window_exchange(matrices.scene.interior, parts, paths, by_groups=by_groups)
 
 
 def exchange_by_reflectance(matrices: PhaseMatrices) -> NDArray[np.float64]:
@@ -457,39 +466,19 @@ def exchange_by_reflectance(matrices: PhaseMatrices) -> NDArray[np.float64]:
     groups = matrices.scene.by_groups
     if groups is None:
         raise ValueError("the scene names no groups of surfaces: DaylightScene(..., by_groups=...)")
-    both = _window_exchange(
-        matrices,
-        by_groups=groups,
-        stopping=Stopping(batches=2),
-        seed=matrices.sampling.seed,
-        cache=matrices.cache,
-        scenes=matrices.scenes,
-    ).values
+    both = _window_exchange(matrices, groups).values
     layers = both.reshape(*both.shape[:2], 1 + len(groups.names), -1)
     return np.moveaxis(layers, 2, 0)[1:]
 
 
 def with_exchange(matrices: PhaseMatrices, *, indoors: bool = False, outdoors: bool = False) -> PhaseMatrices:
     """The matrices with W (indoors) and X (outdoors), for windows that reflect."""
-    parts = matrices.parts.groups
-    common: dict[str, Any] = {
-        "stopping": Stopping(batches=2),
-        "seed": matrices.sampling.seed,
-        "cache": matrices.cache,
-        "scenes": matrices.scenes,
-    }
     if indoors and matrices.exchange is None:
-        matrices = replace(matrices, exchange=_window_exchange(matrices, **common))
+        matrices = replace(matrices, exchange=_window_exchange(matrices))
     if outdoors and matrices.outdoor_exchange is None:
-        parts = parts[: matrices.outdoor_parts]
-        exchange = outdoor_exchange(
-            matrices.scene.exterior,
-            parts,
-            samples=_exchange_samples(matrices.sampling, parts, OUTDOOR_SHARE),
-            max_depth=OUTDOOR_DEPTH,
-            **common,
-        )
-        matrices = replace(matrices, outdoor_exchange=exchange)
+        parts = matrices.parts.groups[: matrices.outdoor_parts]
+        paths = _exchange_paths(matrices, parts, OUTDOOR_SHARE, OUTDOOR_DEPTH)
+        matrices = replace(matrices, outdoor_exchange=outdoor_exchange(matrices.scene.exterior, parts, paths))
     return matrices
 
 
@@ -531,7 +520,7 @@ def with_sunlit(matrices: PhaseMatrices) -> PhaseMatrices:
     interior, parts = matrices.scene.interior, matrices.parts.groups
     sunlit = window_sunlit_shares(
         matrices.scenes.scene(interior, parts),
-        samples=_exchange_samples(matrices.sampling, parts, EXCHANGE_SHARE),
+        samples=_exchange_paths(matrices, parts, EXCHANGE_SHARE, INDOOR_DEPTH).samples,
         seed=matrices.sampling.seed,
     )
     return replace(matrices, sunlit=sunlit)
@@ -581,21 +570,9 @@ def _parts(scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None, 
 def _parts_of_outdoor_groups(
     scene: DaylightScene, sampling: Sampling, cache: MatrixCache | None, scenes: SceneCache
 ) -> Parts:
-    groups = scene.outdoor_groups
-    if not len(scene.exterior.triangles) or not groups:
-        return Parts.whole(groups)
-    cells = [window_cells(group) for group in groups]
-    daylight = cell_daylight(
-        scene.exterior,
-        groups,
-        cells,
-        samples=_cell_samples(sampling, cells),
-        max_depth=OUTDOOR_DEPTH,
-        seed=sampling.seed,
-        cache=cache,
-        scenes=scenes,
-    )
-    return _parts_of_cells(groups, cells, daylight, sampling)
+    if not len(scene.exterior.triangles) or not scene.outdoor_groups:
+        return Parts.whole(scene.outdoor_groups)
+    return _parts_together([scene], None, sampling, cache, scenes)[0]
 
 
 def _cell_samples(sampling: Sampling, cells: Sequence[Cells]) -> int:
@@ -657,28 +634,20 @@ def _daylight(
 ) -> Estimate:
     """D [q, K, P] of the parts that look outdoors."""
     outer = parts.groups[: parts.outdoors(scene)]
-    return daylight_matrix(
-        scene.exterior,
-        outer,
-        max_depth=depth,
-        progress=progress,
-        cache=cache,
-        scenes=scenes,
-        **_daylight_options(sampling, len(scene.outdoor_groups), len(outer)),
-    )
+    paths = _daylight_paths(sampling, len(scene.outdoor_groups), len(outer), depth, cache, scenes)
+    paths, room = replace(paths, progress=progress), TracedRoom(scene.exterior, outer)
+    return daylight_of_rooms([room], None, paths, subdivision=sampling.subdivision)[0]
 
 
-def _daylight_options(sampling: Sampling, groups: int, parts: int) -> dict[str, Any]:
-    """Of `daylight_matrix` for so many window groups in parts."""
+def _daylight_paths(
+    sampling: Sampling, groups: int, parts: int, depth: int, cache: MatrixCache | None, scenes: SceneCache
+) -> PathOptions:
+    """Those of D for so many window groups in parts."""
     samples, batches = sampling.patch_samples, BATCHES
     if parts > groups:  # at about the cost of the whole groups
         samples, batches = samples * groups // parts, PART_BATCHES
-    return {
-        "subdivision": sampling.subdivision,
-        "samples": max(samples // batches, 1),
-        "stopping": Stopping(batches=batches),
-        "seed": sampling.seed,
-    }
+    stopping = Stopping(batches=batches)
+    return PathOptions(max(samples // batches, 1), depth, stopping, sampling.seed, silent, cache, scenes)
 
 
 def _direct_daylight(matrices: PhaseMatrices, exterior: Surfaces, progress: Progress) -> NDArray[np.float64]:
@@ -734,35 +703,18 @@ def _inner_daylight(
     scenes: SceneCache,
 ) -> list[Estimate]:
     """D [q, K, P] of the parts of each group that looks into another room."""
+    samples = max(sampling.patch_samples // INNER_SHARE // BATCHES, 1)
+    paths = PathOptions(samples, INDOOR_DEPTH, Stopping(batches=BATCHES), sampling.seed, silent, cache, scenes)
     return [
-        adjacent_daylight(
-            room.surfaces,
-            room.groups,
-            room.luminance,
-            [parts.groups[q] for q in parts.of(g)],
-            samples=max(sampling.patch_samples // INNER_SHARE // BATCHES, 1),
-            max_depth=INDOOR_DEPTH,
-            stopping=Stopping(batches=BATCHES),
-            seed=sampling.seed,
-            cache=cache,
-            scenes=scenes,
-        )
+        adjacent_daylight(room.surfaces, room.groups, room.luminance, [parts.groups[q] for q in parts.of(g)], paths)
         for g, room in enumerate(adjacent, len(scene.outdoor_groups))
     ]
 
 
-def _view_options(sampling: Sampling) -> dict[str, Any]:
-    """Of `view_matrix`."""
-    return {
-        "samples": max(sampling.sensor_samples // BATCHES, 1),
-        "stopping": Stopping(batches=BATCHES),
-        "seed": sampling.seed,
-    }
-
-
-def _exchange_samples(sampling: Sampling, parts: Sequence[WindowGroup], share: int) -> int:
-    """Paths of each patch between windows: fewer the more windows there are."""
-    return max(sampling.patch_samples // share // len(parts), 8)
+def _view_paths(sampling: Sampling, depth: int, cache: MatrixCache | None, scenes: SceneCache) -> PathOptions:
+    """Those of V of sensors."""
+    samples, stopping = max(sampling.sensor_samples // BATCHES, 1), Stopping(batches=BATCHES)
+    return PathOptions(samples, depth, stopping, sampling.seed, silent, cache, scenes)
 
 
 def _view_inputs(matrices: PhaseMatrices, depth: int) -> tuple[object, ...]:

@@ -5,7 +5,7 @@ of incidence (rank one: spectrum of the panes, times angles of the visible band)
 
     T_c(out, in) = T(out, in) r_c(in),    r_c = tau_c / tau_v of its panes
 
-(of coloured slats that of the light between them and that of the light they reflect, each with its r_c),
+(of coloured slats by the share of T(out, in) that they reflect 0, 1, 2, .. times, each with its r_c),
 
 so that nothing is traced again where the surfaces reflect all channels equally: V, D and their kin
 are those of the visible band, and what was traced through a group is scaled by its factor at the
@@ -23,7 +23,7 @@ which are a few products with the sky for any number of channels.
     sensors by patches       r_c at the patch of incidence
     straight view            r_c at the patch of the sky; of what the outdoors reflects, the mean
                              of the patches of incidence that the sensor sees it through
-    sun and its beam         r_c at the angle of the sun
+    sun and its beam         r_c at the angle of the sun; coloured slats by C_ds of what they reflect n times
 """
 
 from __future__ import annotations
@@ -34,6 +34,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.spectral_factor import ANGLES, PatchFactors, SpectralFactor
 from mitsuba_cfs.methods.coefficients import (
     GroupCoefficients,
@@ -50,9 +51,11 @@ from mitsuba_cfs.methods.phase_light import (
     PhaseLight,
     SensorLight,
     all_hours,
+    direct_sun,
     direct_sun_of_all,
     in_place_of_sun,
     sensor_light,
+    shining_hours,
     sky_coefficients,
     states_of,
     sun_in,
@@ -65,11 +68,12 @@ from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
+from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.spectra.channels import Channels
 from mitsuba_cfs.spectra.daylight import WATER_CM, SpectralSky, spectral_sky
 from mitsuba_cfs.spectra.detectors import NANOMETRES
 from mitsuba_cfs.surfaces import WindowGroup
-from mitsuba_cfs.trace.kernels.scattering import Scattering
+from mitsuba_cfs.trace.kernels.scattering import KlemsScattering, Scattering
 from mitsuba_cfs.trace.paths.scene import PathOptics
 
 Array = NDArray[np.float64]
@@ -80,7 +84,7 @@ class ModeOptics:
     """A system's optics in a mode: those of the visible band, transmission times a factor."""
 
     visible: SystemOptics
-    factor: Array  # [K] r_m of the patches of incidence
+    factor: Array  # r_m of the patches of incidence [K], or of pairs of patches [K out, K in]
     mirrored: float = 1.0  # what it reflects of the room's light, over visible light
 
     @property
@@ -217,10 +221,11 @@ class _Season:
         rooms, of_rooms = rooms_in_bands(light, reflectance, factors, channels)
         self._shares = np.einsum("cq,cm->cqm", of_rooms, of_factors).reshape(channels.count, -1)
         self._modes = []
+        of_slats = _sun_on_slats(light, self._angles)
         for room in rooms:
             groups = [
                 [
-                    _GroupInState(light, lit[g][j], g, self._angles[g][j], room, beam)
+                    _GroupInState(light, lit[g][j], g, self._angles[g][j], room, beam, of_slats=of_slats.get((g, j)))
                     for j, beam in zip(traced_states(states), room.beams[g], strict=True)
                 ]
                 for g, states in enumerate(light.systems)
@@ -236,7 +241,7 @@ class _Season:
             for states, traced in zip(light.systems, groups, strict=True)
         )
         systems = [
-            [ModeOptics(one, of.patches.whole[m], k) for one, of, k in zip(states, angles, mirrored, strict=True)]
+            [ModeOptics(one, of.of_pairs(m), k) for one, of, k in zip(states, angles, mirrored, strict=True)]
             for states, angles, mirrored in zip(light.systems, self._angles, room.mirrored, strict=True)
         ]
         return replace(light, matrices=room.matrices, systems=systems, sensors=sensors)
@@ -310,8 +315,8 @@ class _Modes:
 
 def _modes(factors: Sequence[SpectralFactor], channels: Channels) -> tuple[Array, list[_Angles]]:
     """Modes of the factors of systems: their shares in the channels [C, M], and the systems'."""
-    parts = [(*factor.of_patches(channels), factor.of_angles(channels)) for factor in factors]
-    each = [one for of in parts for one in of]
+    parts = [(factor.of_patches(channels), factor.of_angles(channels)) for factor in factors]
+    each = [one for patches, angles in parts for one in (patches.straight, *patches.reflected, *angles)]
     whole = np.concatenate(each, axis=1)
     left, size, right = np.linalg.svd(whole, full_matrices=False)
     count = 1
@@ -322,10 +327,12 @@ def _modes(factors: Sequence[SpectralFactor], channels: Channels) -> tuple[Array
         count += 1
     split = iter(np.split(right[:count], np.cumsum([one.shape[1] for one in each])[:-1], axis=1))
     found = []
-    for factor in factors:
-        patches = PatchFactors(*(next(split) for _ in PatchFactors._fields))
-        share = None if factor.slats is None else factor.slats.straight_share
-        found.append(_Angles(patches, next(split), share))
+    for factor, (patches, _) in zip(factors, parts, strict=True):
+        straight = next(split)
+        reflected = np.array([next(split) for _ in patches.reflected]).reshape(-1, *straight.shape)
+        shares = None if factor.slats is None else factor.slats.shares
+        angles = np.array([next(split) for _ in range(1 + len(reflected))])
+        found.append(_Angles(PatchFactors(straight, reflected), angles, shares))
     return left[:, :count] * size[:count], found
 
 
@@ -334,20 +341,25 @@ class _Angles:
     """Factors of a system in all modes."""
 
     patches: PatchFactors  # [M, K] of the patches of incidence
-    angles: Array  # [M, A] at `ANGLES`
-    straight_share: Array | None  # [K] of visible light that passes straight on; None: all has one colour
+    angles: Array  # [1 + n, M, A] at `ANGLES`: straight on, and what slats reflect 1, 2, .. times
+    shares: Array | None = None  # of visible light that slats reflect, as of `SlatLight`; None: none
 
-    def scattered(self, optics: SystemOptics) -> Array | None:
-        """The part of T that has a colour of its own [K, K], of the visible band; None: none."""
-        if self.straight_share is None:
-            return None
-        T = optics.transmission
-        return T - np.diag(np.minimum(self.straight_share * T.sum(axis=0), np.diag(T)))
+    def of_pairs(self, m: int) -> Array:
+        """Factors of a mode: of patches of incidence [K], with coloured slats of pairs of patches [K, K]."""
+        straight, reflected = self.patches.straight[m], self.patches.reflected[:, m]
+        if self.shares is None:
+            return straight
+        pairs: Array = straight + np.einsum("nok,nk->ok", self.shares, reflected - straight)
+        return pairs
 
-    def towards(self, group: WindowGroup, directions: Array) -> NDArray[np.float32]:
-        """Factors of light from directions [n, 3] on a window group [M, n]."""
+    def reflected(self, optics: SystemOptics) -> Array | None:
+        """The parts of T that slats reflect 1, 2, .. times [n, K, K], of the visible band; None: none."""
+        return None if self.shares is None else optics.transmission * self.shares
+
+    def towards(self, group: WindowGroup, directions: Array, times: int = 0) -> NDArray[np.float32]:
+        """Factors of light from directions [n, 3] on a window group [M, n] that slats reflect so many times."""
         theta = np.arccos(np.clip(directions @ group.frame[2], 0.0, 1.0))
-        rows = [np.interp(theta, ANGLES, row) for row in self.angles]
+        rows = [np.interp(theta, ANGLES, row) for row in self.angles[times]]
         return np.array(rows, dtype=np.float32)
 
 
@@ -356,44 +368,56 @@ class _Shares:
     """Light of the sensors per unit luminance outside a window part, of visible light [S, K]."""
 
     whole: Array
-    scattered: Array | None  # the part of it that has a colour of its own; None: none
+    reflected: Array | None  # [n, S, K] what slats reflect of it 1, 2, .. times; None: none
 
     @staticmethod
-    def of(whole: Array, view: Array, scattered: Array | None) -> _Shares:
-        """Those by V or V_d [S, K] and the part of T that has a colour of its own [K, K]."""
-        return _Shares(whole, None if scattered is None else view @ scattered)
+    def of(whole: Array, view: Array, reflected: Array | None) -> _Shares:
+        """Those by V or V_d [S, K] and the parts of T that slats reflect [n, K, K]."""
+        return _Shares(whole, None if reflected is None else view @ reflected)
 
     def scaled(self, of: PatchFactors, m: int) -> Array:
         """The same in a mode."""
         scaled = self.whole * of.straight[m]
-        return scaled if self.scattered is None else scaled + self.coloured(of, m)
+        return scaled if self.reflected is None else scaled + self.coloured(of, m)
 
     def coloured(self, of: PatchFactors, m: int) -> Array:
-        """What a mode's scattered light has more than if it passed straight on."""
-        return 0.0 * self.whole if self.scattered is None else self.scattered * (of.scattered[m] - of.straight[m])
+        """What the slats' light in a mode has more than if it had passed between them."""
+        if self.reflected is None:
+            return 0.0 * self.whole
+        coloured: Array = np.einsum("nsk,nk->sk", self.reflected, of.reflected[:, m] - of.straight[m])
+        return coloured
 
 
 class _GroupInState:
     """The light of the sensors through a group in a state, in a band of the room, as modes scale it."""
 
     def __init__(
-        self, light: PhaseLight, one: SensorLight, g: int, angles: _Angles, room: RoomInBand, beam: Array | None
+        self,
+        light: PhaseLight,
+        one: SensorLight,
+        g: int,
+        angles: _Angles,
+        room: RoomInBand,
+        beam: Array | None,
+        *,
+        of_slats: Array | None,
     ) -> None:
         matrices, coefficients = room.matrices, one.coefficients
+        self._of_slats = of_slats  # [n, S, L] of the direct sun; None: none
         self._one, self._angles, self._beam = one, angles, beam
         parts = matrices.parts.of(g)
         self._daylight = [matrices.daylight.values[q] for q in parts]
-        scattered = angles.scattered(coefficients.optics)
+        reflected = angles.reflected(coefficients.optics)
         view = sensor_matrix(matrices).values
-        self._rest = [_Shares.of(without_straight(matrices, coefficients, q), view[:, q], scattered) for q in parts]
+        self._rest = [_Shares.of(without_straight(matrices, coefficients, q), view[:, q], reflected) for q in parts]
         self._by_sun: list[tuple[_Shares, Array]] = []
         if coefficients.by_sun is not None:
             direct, direct_view = direct_daylight(matrices), direct_sensor_matrix(matrices)
             for q in parts:
-                shares = _Shares.of(sun_shares(matrices, coefficients, q), direct_view[:, q], scattered)
+                shares = _Shares.of(sun_shares(matrices, coefficients, q), direct_view[:, q], reflected)
                 self._by_sun.append((shares, direct[q]))
         self._seen = _outdoors_seen(light, coefficients, parts)
-        self._parts, self._reflected, self._sun = parts, light.reflected, light.sky.lit_sun
+        self._parts, self._reflected = parts, light.reflected
         self._straight_outdoors = one.added  # [S, L] of `added`: what is seen straight through
         if one.added is not None and one.beam_in_room is not None:
             self._straight_outdoors = one.added - one.beam_in_room
@@ -403,7 +427,8 @@ class _GroupInState:
         group = matrices.scene.groups[g]
         sky = ReinhartSky(matrices.sampling.subdivision).directions
         self._to_sky = angles.towards(group, sky)  # [M, P]
-        self._to_sun = angles.towards(group, light.sky.direction)  # [M, L]
+        each = range(len(angles.angles))
+        self._to_sun = np.array([angles.towards(group, light.sky.direction, n) for n in each])  # [1 + n, M, L]
 
     def in_mode(self, m: int) -> SensorLight:
         """The light in a mode."""
@@ -422,19 +447,45 @@ class _GroupInState:
             whole = whole + scaled + (straight.values.values - direct) * seen
             if by_sun is not None and straight.direct is not None:
                 by_sun = by_sun + scaled
-        beam, added = self._to_sun[m], one.added
+        beam, added = self._to_sun[0, m], one.added
         if added is not None and self._beam is not None:
             added = self._beam * beam
             added += self._straight_outdoors * seen
             if self._reflected is not None:
                 added += replaced_through(self._reflected, self._parts, rest)
-        optics, sun = ModeOptics(coefficients.optics, of.whole[m]), None
+        optics, sun = ModeOptics(coefficients.optics, self._angles.of_pairs(m)), None
         if one.sun is not None:
             sun = one.sun * beam
-            if self._angles.straight_share is not None:  # what is scattered of it, by patches
-                coloured = sum(shares.coloured(of, m) @ daylight for shares, daylight in self._by_sun)
-                sun += times_sky(coloured, self._sun)
+            if self._of_slats is not None:
+                sun += np.einsum("nsl,nl->sl", self._of_slats, self._to_sun[1:, m] - beam)
         return SensorLight(replace(coefficients, optics=optics, whole=whole, by_sun=by_sun), added, sun)
+
+
+def _sun_on_slats(light: PhaseLight, angles: Sequence[Sequence[_Angles]]) -> dict[tuple[int, int], Array]:
+    """Illuminance [n, S, L] of the sensors directly from the sun that coloured slats reflect n times.
+
+    Args: angles: of the systems [G][J]; returned are those of the groups and states with such slats.
+    """
+    hours = shining_hours(light)
+    if not light.matrices.five_phase or not len(hours):
+        return {}
+    luminance, omega = light.sky.illuminance[hours] / SUN_SOLID_ANGLE, KLEMS_FULL.projected_solid_angles()
+    ways: list[list[Scattering | None]] = []
+    of: list[tuple[int, int]] = []
+    for g, states in enumerate(light.systems):
+        for j in traced_states(states):
+            parts = angles[g][j].reflected(states[j])
+            for values in () if parts is None else parts:
+                ways.append([None] * len(light.systems))
+                ways[-1][g] = KlemsScattering(KLEMS_FULL, values / omega, np.zeros(KLEMS_FULL.size))
+                of.append((g, j))
+    found: dict[tuple[int, int], list[Array]] = {}
+    for (g, j), one in zip(of, direct_sun(light, ways, hours) if ways else [], strict=True):
+        values = np.zeros((len(light.scene.sensors()[0]), len(light.sky.lit)))
+        if one is not None:
+            values[:, hours] = one.values[g] * luminance
+        found.setdefault((g, j), []).append(values)
+    return {key: np.array(values) for key, values in found.items()}
 
 
 def _outdoors_seen(light: PhaseLight, group: GroupCoefficients, parts: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from mitsuba_cfs.methods.coefficients import (
     sensor_matrix,
     without_straight,
 )
-from mitsuba_cfs.methods.optics import SystemOptics, combinations
+from mitsuba_cfs.methods.optics import SystemOptics, combinations, neighbours
 from mitsuba_cfs.methods.phase_light import PhaseLight, State, coefficients_in_state, sensor_light, states_of
 from mitsuba_cfs.methods.reflected_sun import replaced_luminance
 from mitsuba_cfs.methods.subdivision import coarse_sky
@@ -40,11 +40,12 @@ def noise_of_sums(light: PhaseLight, state: State | None, illuminance: Array) ->
     That of V, D, B, C_ds, the reflected sun, and W and X of what windows reflect; those of
     different groups and states are taken as independent.  The error that D leaves as a mean over a
     part of a group is included (`mitsuba_cfs.methods.subdivision`).  What windows reflect, and D's
-    means, have the same share of the illuminance as in the mean over all hours.
+    means, have the same share of the illuminance as in the mean over all hours.  A state that is the
+    mean of two traced ones has the noise of the nearer.
 
     Args: illuminance: that of the sensors in this state, the eye last [S + 1, L] [lx].
     """
-    rows, total = states_of(light, state), illuminance.sum(axis=1)
+    rows, total = _traced(light, states_of(light, state)), illuminance.sum(axis=1)
     of_method = _of_method(light, rows)
 
     def noise(weights: Array | None) -> Noise:
@@ -55,6 +56,16 @@ def noise_of_sums(light: PhaseLight, state: State | None, illuminance: Array) ->
         return _of_tracing(light, rows, weights) + of_method.scaled(share)
 
     return noise
+
+
+def _traced(light: PhaseLight, rows: State) -> State:
+    """The states [G, L], of which each mean of two others is the nearer of these."""
+    nearer = []
+    for row, states in zip(rows, light.systems, strict=True):
+        pairs = [neighbours(states, j) for j in range(len(states))]
+        own = [j if pair is None else pair[pair[2] > 0.5] for j, pair in enumerate(pairs)]
+        nearer.append(np.array(own, dtype=np.int64)[row])
+    return np.stack(nearer) if nearer else rows
 
 
 def relative_error_under(light: PhaseLight, sky: Array, state: int = 0) -> Array:

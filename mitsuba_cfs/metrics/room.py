@@ -94,7 +94,7 @@ def room_metrics(
     """Daylight metrics of a room, each with the schedule of its standard.
 
     Args:
-        illuminance: [H, S] [lx] of every time step of the weather (`schedules.whole_year` puts
+        illuminance: [H, S] [lx] of every time step of the weather (`AnnualSky.whole_year` puts
             sun-up hours back into the year).
         direct_illuminance: [H, S] [lx] straight from the sun, blinds open, for ASE.
         areas: [S] area of each sensor; equal unless given.

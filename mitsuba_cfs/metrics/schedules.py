@@ -63,13 +63,3 @@ def daylight_hours(weather: Weather, *, ranked_by: str = "diffuse") -> Mask:
     mask = np.zeros(len(light), dtype=bool)
     mask[order[len(light) - len(light) // 2 :]] = True
     return mask
-
-
-def whole_year(values: ArrayLike, hours: ArrayLike) -> NDArray[np.float64]:
-    """Values [h, S] of the time steps where the mask `hours` [H] is set, as [H, S] with 0 else."""
-    values, hours = np.asarray(values), np.asarray(hours)
-    if hours.dtype != bool or len(values) != np.count_nonzero(hours):
-        raise ValueError(f"expected a mask of {len(values)} time steps, got {hours.sum()}")
-    result = np.zeros((len(hours), *values.shape[1:]), dtype=values.dtype)
-    result[hours] = values
-    return result

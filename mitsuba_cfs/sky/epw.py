@@ -52,18 +52,7 @@ def read_wea(path: str | PathLike[str], *, whole_year: bool = True) -> Weather:
         weather_table.checked(path, first_line, name, rows[:, 3 + i], 0.0, 1500.0)
         for i, name in enumerate(("direct irradiance", "diffuse irradiance"))
     )
-    weather = Weather(
-        site=site.name,
-        latitude_deg=site.latitude_deg,
-        longitude_deg=site.longitude_deg,
-        timezone_h=site.timezone_h,
-        elevation_m=site.elevation_m,
-        step_h=step_h,
-        times=times,
-        direct_normal=direct,
-        diffuse_horizontal=diffuse,
-        file=Path(path),
-    )
+    weather = Weather(*site.values, step_h, times, direct, diffuse, file=Path(path))
     if unit == 1:
         return checked_sun(weather, path)
     weather = checked_sun(replace(weather, global_horizontal=direct + diffuse), path)
@@ -198,15 +187,11 @@ def read_epw(path: str | PathLike[str]) -> Weather:
     direct = column.required("direct normal irradiance")
     diffuse = column.required("diffuse horizontal irradiance")
     weather = Weather(
-        site=site.name,
-        latitude_deg=site.latitude_deg,
-        longitude_deg=site.longitude_deg,
-        timezone_h=site.timezone_h,
-        elevation_m=site.elevation_m,
-        step_h=step_h,
-        times=times,
-        direct_normal=direct,
-        diffuse_horizontal=diffuse,
+        *site.values,
+        step_h,
+        times,
+        direct,
+        diffuse,
         global_horizontal=column.whole("global horizontal irradiance"),
         direct_normal_illuminance=column.whole("direct normal illuminance"),
         diffuse_horizontal_illuminance=column.whole("diffuse horizontal illuminance"),

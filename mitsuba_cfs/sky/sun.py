@@ -42,7 +42,11 @@ def day_of_sun(weather: Weather, day: pd.Timestamp) -> NDArray[np.float64]:
 
     Local standard time at the weather's place; by the Solar Position Algorithm, as above.
     """
-    times = pd.date_range(day, periods=24 * 60 + 1, freq="min")
+    return sun_at(weather, pd.date_range(day, periods=24 * 60 + 1, freq="min"))
+
+
+def sun_at(weather: Weather, times: pd.DatetimeIndex) -> NDArray[np.float64]:
+    """Unit vectors [N, 3] towards the sun at moments in local standard time, by the Solar Position Algorithm."""
     directions = _spa_directions(weather, times)
     return rotated(directions, weather.turned_deg) if weather.turned_deg else directions
 

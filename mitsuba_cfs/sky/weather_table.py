@@ -271,6 +271,11 @@ class Location:
     timezone_h: float
     elevation_m: float
 
+    @property
+    def values(self) -> tuple[str, float, float, float, float]:
+        """The first fields of `Weather`."""
+        return self.name, self.latitude_deg, self.longitude_deg, self.timezone_h, self.elevation_m
+
 
 def read_lines(path: FilePath) -> list[str]:
     """The file's lines; `DataError` where it cannot be read or is empty."""

@@ -18,6 +18,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, json_text, replacing, write_table, write_text
+from scenes.commands.examples import CommandGroup
 from scenes.commands.room_options import seed_option
 from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
 
@@ -62,7 +63,7 @@ BAND_OPTION = click.option(
 )
 
 
-@click.group("bsdf")
+@click.group("bsdf", cls=CommandGroup)
 def command() -> None:
     """Read, check, plot and make BSDF files."""
 
@@ -233,7 +234,11 @@ def plot(file: Path, incident: tuple[float, float], band: str, out: Path) -> Non
     if band not in data.bands:
         raise DataError(f"has no {band} band", file=file)
     direction = _from_radiance(np.array([[*incident, 0.0, 0.0]]))[0][0]
-    title = f"{file.name}, {band}, light from theta {incident[0]:g}°, phi {incident[1]:g}°"
+    side = "outdoors" if direction[2] > 0 else "the room"
+    title = (
+        f"{file.name}: BSDF, {band.lower()} band, light from {side} "
+        f"(theta {incident[0]:g}°, phi {incident[1]:g}°), both hemispheres seen from outdoors"
+    )
     from scenes.plots import plot_hemispheres
 
     figure = plot_hemispheres(data.bands[band], direction, title)
@@ -280,14 +285,14 @@ def generate(out: Path, **options) -> None:
 
     A fabric is not traced: its BSDF follows from what a data sheet states (ES-SO, EN 14501).
 
-    Of coloured slats or sheets the light by wavelength goes into a CSV file beside --out.
+    Of coloured slats or sheets the light by wavelength goes into a JSON file beside --out.
     """
     from scenes.bsdf_generation import generated_file
     from scenes.commands.progress_bar import ProgressBar
     from scenes.fenestration.thermal_file import write_slat_light
 
     check_file(out, inputs=[options[name] for name in ("geometry", "product", "fabrics", "spectrum")])
-    of_slats = out.with_name(f"{out.stem}_slats.csv")
+    of_slats = out.with_name(f"{out.stem}_slats.json")
     if options["spectrum"] is not None or options["sheet_colour"] is not None:
         check_file(of_slats, inputs=[options["spectrum"]])
     with ProgressBar() as progress:

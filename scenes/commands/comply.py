@@ -47,7 +47,8 @@ def list_rules(context: click.Context, _: click.Parameter, value: bool) -> None:
         rule = read_rule(name)
         click.echo(f"{name}: {rule.title} ({rule.edition})")
         if rule.sites:
-            click.echo(f"  asks for the weather of: {', '.join(rule.sites)}")
+            words = [f"'{word}'" for word in rule.sites]
+            click.echo(f"  asks for the weather of: {rule.weather_asked} (site or file name has {' or '.join(words)})")
         for label, sentences in (("included", rule.included), ("left out", rule.left_out)):
             for sentence in sentences:
                 click.echo(f"  {label}: {sentence}")
@@ -78,6 +79,12 @@ def list_rules(context: click.Context, _: click.Parameter, value: bool) -> None:
     type=FILE,
     help="BSDF XML file of every window with its blinds closed; default: the last state that the "
     "IFC holds, else LM-83's shade.",
+)
+@click.option(
+    "--operation",
+    type=FILE,
+    help="Operation file whose [control] moves the blinds for glare, temperatures and light at the eye; "
+    "default: LM-83's rule.",
 )
 @click.option("--uses", type=FILE, help="TOML file of room uses; see docs/comply.md.")
 @click.option(
@@ -119,7 +126,8 @@ def command(
     from scenes.result_folder import ResultFolder
 
     page_options = read_page(page, DossierSection, chosen_language())
-    inputs = (building, options.weather, options.system, options.closed, options.uses, options.lamps)
+    inputs = (building, options.weather, options.system, options.closed, options.operation)
+    inputs += (options.uses, options.lamps)
     inputs += (*options.linked, *options.surroundings, *page_options.inputs)
     folder = ResultFolder(out, "comply", inputs=inputs)
     if write_ifc is not None:

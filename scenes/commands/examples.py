@@ -1,6 +1,8 @@
-"""Examples at the end of each command's help: words that run when the files are there."""
+"""The help of a group of commands: examples of each command, and the names near an unknown one."""
 
 from __future__ import annotations
+
+from difflib import get_close_matches
 
 import click
 
@@ -47,6 +49,8 @@ EXAMPLES = {
     "design": ("cfs design design.toml --out design",),
     "fit": ("cfs fit fit.toml --out fit",),
     "pv": ("cfs pv house.ifc --weather city.epw --study modules.toml --out yield",),
+    "site neighbours": ("cfs site neighbours next-door.ifc --weather city.epw --proposed tower.glb --out site",),
+    "site reflections": ("cfs site reflections house.ifc --weather city.epw --points street.csv --out site",),
     "calibrate": ("cfs calibrate",),
     "ifc attach": (
         "cfs ifc attach house.ifc --facade S --bsdf blind.xml --u 1.1 --g 0.25 -o out.ifc",
@@ -54,6 +58,7 @@ EXAMPLES = {
     ),
     "ifc control": ("cfs ifc control house.ifc shading.toml -o controlled.ifc",),
     "ifc correct": ("cfs ifc correct house.ifc -o corrected.ifc",),
+    "ifc info": ("cfs ifc info house.ifc", "cfs ifc info house.ifc --json house.json"),
     "ifc query": ("cfs ifc query house.ifc 'IfcWindow, location=\"Level 2\"'",),
     "ifc survey": ("cfs ifc survey models/*.ifc --markdown survey.md",),
     "ifc templates": ("cfs ifc templates --out templates",),
@@ -93,3 +98,18 @@ def with_examples(command: click.Command, name: str) -> click.Command:
     elif lines := EXAMPLES.get(name):
         command.epilog = "\b\n" + "\n".join(("Examples:", *(f"  {line}" for line in lines)))
     return command
+
+
+class CommandGroup(click.Group):
+    """A group whose error about an unknown command names those that are near."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """As click's."""
+        known = self.list_commands(ctx)
+        near = get_close_matches(args[0], known, n=2)
+        if args[0] not in known and near:
+            hint = " or ".join(f"'{name}'" for name in near)
+            ctx.fail(f"No such command {args[0]!r}. (Did you mean {hint}?)")
+        return super().resolve_command(ctx, args)

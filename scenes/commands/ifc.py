@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import click
 
-from mitsuba_cfs.files import check_file, write_text
+from mitsuba_cfs.files import check_file, json_text, write_text
 from mitsuba_cfs.progress import Stage
 from scenes.commands.check import command as check
+from scenes.commands.examples import CommandGroup
 from scenes.commands.export import command as export
 from scenes.commands.room_options import FILE, IFC_FILE, out_folder_option, space_option, u_option
 from scenes.result_folder import ResultFolder
@@ -39,7 +42,7 @@ BANDS = ("Visible", "Solar")
 UNCUT = 100_000  # columns of a table that nobody sees
 
 
-@click.group(commands=[bonsai])
+@click.group(cls=CommandGroup, commands=[bonsai])
 def command() -> None:
     """Attach data to IFC files, query and survey them.  See also `cfs check` and `cfs export`."""
 
@@ -205,6 +208,47 @@ def survey(files: tuple[Path, ...], table: Path | None) -> None:
             if table is not None:  # what is done is kept if the rest is broken off
                 write_text(table, markdown(rows) + "\n")
     click.echo(markdown(rows))
+
+
+@command.command()
+@click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
+@click.option("--json", "table", type=click.Path(dir_okay=False, path_type=Path), help="Also write it as JSON.")
+def info(building: Path, table: Path | None) -> None:
+    """Show what an IFC file states: program, units, site, north, storeys, elements.
+
+    Its geometry is not read: `cfs check` lists rooms, windows and problems.
+    """
+    if table is not None:
+        check_file(table, field="--json", inputs=[building])
+    from bim.ifc.summary import summary
+
+    models = summary(building)
+    for model in models:
+        for line in _info_lines(model):
+            click.echo(line)
+    if table is not None:
+        write_text(table, json_text(models))
+
+
+def _info_lines(model: dict[str, Any]) -> Iterator[str]:
+    """The summary of a model as lines."""
+    yield f"{model['file']}: {model['schema']}, written by {', '.join(model['written_by']) or 'an unnamed program'}"
+    yield f"units: 1 unit of length = {model['metres_per_unit']:g} m"
+    if model["latitude_deg"] is None:
+        yield "site: no latitude and longitude; the weather file decides"
+    else:
+        place = f"latitude {model['latitude_deg']:.4f}, longitude {model['longitude_deg']:.4f}"
+        yield f"site: {place}, elevation {model['elevation_m']:.1f} m"
+    north = model["north_deg"]
+    if north is None:
+        yield "north: not stated; +y is taken"
+    else:
+        yield f"north: +y points {abs(north):.1f} degrees {'east' if north >= 0 else 'west'} of north"
+    yield f"map: {model['map'] or 'not stated'}"
+    storeys = (f"{name or 'unnamed'} ({count})" for name, count in model["storeys"].items())
+    yield f"storeys (spaces): {', '.join(storeys) or 'none'}"
+    yield ", ".join(f"{label}: {count}" for label, count in model["counts"].items())
+    yield f"windows with attached systems: {model['windows_with_attached_data']}"
 
 
 @command.command()

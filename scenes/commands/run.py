@@ -126,6 +126,9 @@ class Percentage(click.ParamType):
     help="Relative standard error of the sensors' yearly means that is enough, such as 5%: fewer "
     "rays are traced where a first plan shows that these suffice.",
 )
+@click.option(
+    "--energyplus", is_flag=True, help="Also write the rooms as EnergyPlus input (model.epJSON, schedules.csv)."
+)
 @click.option("--netcdf", is_flag=True, help="Also write all results to results.nc, for xarray; see docs/formats.md.")
 def command(
     out: Path, page: Path | None, settings: tuple[str, ...], processes: int, scheduler: str | None, **chosen

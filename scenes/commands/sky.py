@@ -15,6 +15,7 @@ from mitsuba_cfs.files import check_file, write_table
 from mitsuba_cfs.matrices.mtx_io import FORMATS, write_matrix
 from mitsuba_cfs.sky.cie import KINDS
 from mitsuba_cfs.sky.options import LABELS, LEAST_ALTITUDE_DEG, PARTS, SUN_PATCHES
+from scenes.commands.examples import CommandGroup
 from scenes.commands.room_options import subdivision_option, sun_option
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ ground_option = click.option(
 )
 
 
-@click.group()
+@click.group(cls=CommandGroup)
 def command() -> None:
     """Sun positions and sky matrices of a weather file (EPW or WEA)."""
 

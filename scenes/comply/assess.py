@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from bim.model import Space
 from scenes.comply.findings import Findings
-from scenes.comply.need import Need
+from scenes.comply.needs import Need
 from scenes.comply.openings import openings_of
 from scenes.comply.rules import NOT_MET, CriterionTable, LevelTable, RuleTable
 from scenes.comply.uses import RoomUse

@@ -9,10 +9,11 @@ import numpy as np
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
+from mitsuba_cfs.notes import Note
 from scenes.fenestration.systems import FenestrationSystem, States
 
 DEFAULT_TRANSMITTANCE = 0.05  # diffuse, of a shade of which nothing is known: LM-83-12, 2.2.7
-DEFAULT_NAME = "LM-83's default shade"
+DEFAULT_NAME = Note("LM-83's default shade")
 
 
 def open_and_closed(systems: Mapping[str, States], closed: FenestrationSystem | None) -> dict[str, States]:
@@ -38,10 +39,10 @@ def with_default_shade(system: FenestrationSystem) -> FenestrationSystem:
     visible = combine_layers([system.visible, diffuse_shade(DEFAULT_TRANSMITTANCE)]).bsdf
     return replace(
         system,
-        name=f"{system.name} with {DEFAULT_NAME}",
+        name=Note("{system} with {shade}", system=system.name, shade=DEFAULT_NAME),
         visible=visible,
         tree=None,
-        source=f"{system.source}, behind it {DEFAULT_NAME} (5 % diffuse)",
+        source=Note("{source}, behind it {shade} (5 % diffuse)", source=system.source, shade=DEFAULT_NAME),
     )
 
 

@@ -7,7 +7,7 @@ where a rule limits them.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -54,16 +54,19 @@ from scenes.input_files import building_of
 from scenes.inputs import first_states, inputs_of
 from scenes.language.catalogue import N_
 from scenes.report.method import METHODS
+from scenes.room.control_groups import same_control
 from scenes.room.daylight import overcast_factor
 from scenes.room.glare import rating_of
 from scenes.room.heat import heat_alone
 from scenes.room.inputs import RoomInputs, room_inputs, skies_for
 from scenes.room.light import RoomLight, grid_points, room_light
 from scenes.room.luminaires import lamp_spectra
+from scenes.room.operation import Operation, check_states, used_operation
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
-from scenes.room.room import StageTimes
+from scenes.room.room import StageTimes, asked_year, inputs_of_room
 from scenes.room.series import RoomSeries, corner
+from scenes.room.shared_states import with_shared_states
 from scenes.room.solar import seasonal_outdoors
 from scenes.room.spectral import eye_illuminances
 from scenes.room.zone import room_zone, zone_surfaces
@@ -100,7 +103,8 @@ def solar_sentence(system: FenestrationSystem) -> str:
     heat = thermal_system(system)
     found = {rating.method: rating for rating in system_ratings(system, heat)}
     rating: ThermalRating = found.get(STANDARD) or found["heat balance"]
-    limits = ", ".join(f"{limit:.2f}" for limit in CLASSES["g"])
+    values = {f"limit_{number}": limit for number, limit in enumerate(CLASSES["g"])}
+    limits = Note(", ".join(f"{{{key}:.2f}}" for key in values), **values)
     source = Note("as in the heat balance") if rating.method == "heat balance" else rating.method
     return Note(
         "{system}: g_tot {g:.2f} at normal incidence ({source}), class {solar_class} for the "
@@ -126,7 +130,7 @@ def sensor_grid_of(space: Space, table: GridTable) -> SensorGrid:
 def lights_of(room: RoomInputs, traced: RoomLight, operated: Iterable[int]) -> list[GridLight]:
     """The light on each grid of a room.
 
-    The windows' first state is open, their second closed; LM-83's rule moves them by group.
+    The windows' first state is open, their last closed; LM-83's rule moves them by group.
 
     Args: operated: numbers of the grids whose light with operated blinds is wanted.
     """
@@ -138,7 +142,9 @@ def lights_of(room: RoomInputs, traced: RoomLight, operated: Iterable[int]) -> l
     opened, factor = illuminance(light), overcast_factor(light)
     through = direct_sun_by_group(light) or []
     points = traced.scene.points
-    seen = [[sight_through(one).is_view for one in room.windows.in_state(j)] for j in (0, 1)]
+    last = [len(of) - 1 for of in light.systems]
+    ends = room.windows.in_state(0), [of[-1] for of in room.windows.systems]
+    seen = [[sight_through(one).is_view for one in of] for of in ends]
     found, first = [], 0
     for number, grid in enumerate(room.grids):
         count = len(grid_points(room.space, grid))
@@ -148,7 +154,8 @@ def lights_of(room: RoomInputs, traced: RoomLight, operated: Iterable[int]) -> l
         blinds = closed = free = None
         if number in operated:
             state = blinds_operated([part.T for part in direct]).astype(np.int64)  # [G, L]
-            blinds, closed = year(illuminance(light, state)[own]), sky.whole_year(state).T > 0
+            lit = illuminance(light, state * np.array(last, dtype=np.int64)[:, None])
+            blinds, closed = year(lit[own]), sky.whole_year(state).T > 0
             free = np.where(closed, seen[1], seen[0])
         sun = np.sum(direct, axis=0) if direct else np.zeros_like(opened[own])
         found.append(GridLight(points[own], year(opened[own]), year(sun), factor[own], blinds, closed, free))
@@ -197,15 +204,12 @@ def seat_glare(
 
 
 def seat_eye(
-    room: RoomInputs, light: RoomLight, closed: NDArray[np.bool_] | None, tables: OperationTables | None
+    room: RoomInputs, light: RoomLight, state: NDArray[np.int64], tables: OperationTables | None
 ) -> tuple[EyeLight, list[str]]:
     """Light at the eye of a room, and notes.
 
-    Args: closed: [H, G] as of `room_heat`; tables: the luminaires and colours of the room.
+    Args: state: [H, G] of the window groups; tables: the luminaires and colours of the room.
     """
-    state = np.zeros((room.skies.hours, len(room.windows.groups)), dtype=np.int64)
-    if closed is not None:
-        state = closed[:, : state.shape[1]].astype(np.int64)
     room = replace(room, operation=tables)
     daylight, notes = eye_illuminances(room, light, state)
     lamps = None
@@ -221,17 +225,8 @@ def seat_eye(
     return EyeLight(daylight, lamps, used), notes
 
 
-def room_heat(
-    room: RoomInputs, light: RoomLight, closed: NDArray[np.bool_] | None, *, progress: Progress = silent
-) -> RoomHeat:
-    """Operative temperatures of a room that neither heats nor cools.
-
-    Args:
-        closed: [H, G] when the blinds of each window group are closed. None: open all year.
-    """
-    state = np.zeros((room.skies.hours, len(room.windows.groups)), dtype=np.int64)
-    if closed is not None:
-        state = closed[:, : state.shape[1]].astype(np.int64)
+def room_heat(room: RoomInputs, light: RoomLight, state: NDArray[np.int64], *, progress: Progress = silent) -> RoomHeat:
+    """Operative temperatures of a room that neither heats nor cools; state: [H, G] of the window groups."""
     outdoors = seasonal_outdoors(room, light, progress=progress)
     zone = room_zone(room, zone_surfaces(room), outdoors, state, progress=progress)
     thermal, _ = heat_alone(zone, room.weather, room.options.heat_step_s, progress)
@@ -321,8 +316,9 @@ def check_rooms(
         tuple(check.assumptions(rooms, left_out(spaces, glazed, dark))),
         check.head,
         tuple(dict.fromkeys(notes)),
-        (*building.issues, *view_issues, *issues),
+        (*check.head.issues, *view_issues, *issues),
         check.seconds,
+        blinds=check.blinds,
     )
 
 
@@ -334,7 +330,14 @@ class Check:
         self.options, self.files, self.progress = options, files, progress
         self.file = options.building or Path(building.name)
         self.parts = frozenset(p for rule in files.rules.values() for p in rule.parts)
-        self.inputs = inputs_of(building, options, files.inputs, rooms="all", states=self._states, fill=self.lit)
+        self.operation = files.inputs.operation  # moves the blinds; gains and set points are those of the rules
+        plain = replace(files.inputs, operation=None)
+        self.inputs = inputs_of(
+            building, options, plain, rooms="all", states=self._states, fill=self.lit, tables=self.tables
+        )
+        self.operation = self.operation and used_operation(self.operation, self.inputs.building)
+        if self.operation is not None and self.lit:
+            check_states(self.operation, max(map(len, self.inputs.filled.values()), default=1))
         self.systems, self.building = self.inputs.systems, self.inputs.building
         self.shaded = self._shaded(self.inputs.filled)
         extra = [*unused_notes(building), *solar_sentences(self.systems)]
@@ -354,10 +357,17 @@ class Check:
         return self.files.closed is not None or min(map(len, systems.values()), default=0) > 1
 
     def _states(self, systems: Mapping[str, States]) -> Mapping[str, States]:
-        """Each window open, and closed too where blinds move."""
+        """Each window open, and closed too where blinds move; in all states where an operation moves them."""
+        if self.operation is not None and self._shaded(systems):
+            return systems
         if "operated" in self.parts or (self._shaded(systems) and self.moving):
             return open_and_closed(systems, self.files.closed)
         return first_states(systems)
+
+    @property
+    def tables(self) -> OperationTables | None:
+        """The tables of the operation; None without one."""
+        return None if self.operation is None else self.operation.tables
 
     @property
     def lit(self) -> bool:
@@ -406,6 +416,11 @@ class Check:
         skies = skies_for(self.files.weather, room.sampling, **room.sky)
         self.progress("sky", 1.0)
         cache = MatrixCache.of_user() if options.cache else None
+        if self.moving and self.shaded:
+            chosen = self.building, spaces, self.systems, self.files.weather, room
+            self.operation = with_shared_states(
+                self.operation, *chosen, skies=skies, cache=cache, progress=self.progress
+            )
 
         def compute(space: Space, steps: Progress) -> RoomLights:
             return self._light(space, skies, cache, steps)
@@ -421,7 +436,9 @@ class Check:
             moved_lights,
             options.building,
             alike=lambda one, other: (
-                self._costly(one) == self._costly(other) and self._setups(one) == self._setups(other)
+                self._costly(one) == self._costly(other)
+                and self._setups(one) == self._setups(other)
+                and same_control(self.tables, self.building, one, other)
             ),
         ).results(self.progress)
         left = time.monotonic() - start - sum(self.seconds.get(name, 0.0) for name in PARTS)
@@ -458,10 +475,12 @@ class Check:
             self.systems,
             self.files.weather,
             self.options.room,
+            operation=self.tables,
             skies=skies,
             cache=cache,
             grids=distinct,
         )
+        room = replace(room, operation=None)
         operated = {distinct.index(grids[name]) for name, rule in rules.items() if "operated" in rule.parts}
         if self.moving and self.shaded:
             operated = operated or {0}
@@ -470,21 +489,21 @@ class Check:
             light = room_light(room, progress=progress)
         with times.stage(SUMS):
             found = lights_of(room, light, operated)
-        closed = next((one.closed for one in found if one.closed is not None), None)
-        closed = closed if self.shaded else None
+        state = self._state(room, found, skies, cache)
         glare = None
         if self.glaring and "glare" in self._costly(space):
-            state = None if closed is None else closed[skies.lit].T.astype(np.int64)
             with times.stage(GLARE):
                 glare = seat_glare(
                     room,
                     light,
-                    state,
+                    None if state is None else light.states(state),
                     grid=self.options.grid,
                     directions=self.options.directions,
                     eye_height=self.options.eye_height,
                     progress=progress,
                 )
+        open_all = np.zeros((skies.hours, len(room.windows.groups)), dtype=np.int64)
+        state = open_all if state is None else state
         heats: dict[str, RoomHeat] = {}
         with times.stage(HEAT):
             distinct_setups: list[tuple[OperationTables | None, RoomHeat]] = []
@@ -492,14 +511,14 @@ class Check:
                 heat = next((heat for one, heat in distinct_setups if one == setup), None)
                 if heat is None:
                     operated_room = replace(room, operation=setup)
-                    heat = room_heat(operated_room, light, closed, progress=progress)
+                    heat = room_heat(operated_room, light, state, progress=progress)
                     distinct_setups.append((setup, heat))
                 heats[name] = heat
         eye = None
         if eyes:
             tables = None if self.files.lamps is None else self.files.lamps.tables.of_room(self.building, space)
             with times.stage(EYES):
-                eye, notes = seat_eye(room, light, closed, tables)
+                eye, notes = seat_eye(room, light, state, tables)
             self.eye_notes += notes
         self._took(times.seconds)
         of_room = Findings(self.calendar, glare=glare, eye=eye)
@@ -513,6 +532,22 @@ class Check:
         groups = tuple(g.name for g in room.windows.groups)
         return RoomLights(space, by_rule, values, groups, glare)
 
+    def _state(
+        self, room: RoomInputs, lights: Sequence[GridLight], skies: AnnualSky, cache: MatrixCache | None
+    ) -> NDArray[np.int64] | None:
+        """The states [H, G] of a room's window groups by the operation, else by LM-83's rule; None: open all year."""
+        if not (self.shaded and self.moving):
+            return None
+        if self.operation is None:
+            closed = next((one.closed for one in lights if one.closed is not None), None)
+            if closed is None:
+                return None
+            last = np.array([len(of) - 1 for of in room.windows.systems], dtype=np.int64)
+            return closed[:, : len(last)] * last
+        chosen = self.building, room.space, self.systems, self.files.weather, self.options.room
+        asked = asked_year(inputs_of_room(*chosen, operation=self.operation, skies=skies, cache=cache))
+        return asked.states[:, room.windows.control]
+
     def _rule_words(self) -> Iterator[str]:
         """Included and omitted parts of each rule of heat; rules that ask for other weather."""
         weather = self.files.weather
@@ -523,7 +558,7 @@ class Check:
                 yield Note(
                     "{rule}: no verdict. It asks for the weather of {sites}; {file} is not that.",
                     rule=Note(rule.title),
-                    sites=", ".join(rule.sites),
+                    sites=rule.weather_asked,
                     file=weather.site if weather.file is None else weather.file.name,
                 )
             for sentence in rule.included:
@@ -608,34 +643,30 @@ class Check:
             )
             yield from self.glass
 
+    @property
+    def blinds(self) -> str:
+        """How the blinds move, in words."""
+        return blinds_words(self.shaded, self.operation)
+
     def _light_words(self) -> Iterator[str]:
         """What was assumed for light, glare and heat."""
         room = self.options.room
         if "glare" in self.parts and not self.glaring:
             yield Note("Glare was not computed; --annual-glare rates every hour with daylight.")
         elif self.glaring:
-            yield glare_words(self.options, shaded=self.shaded)
+            yield glare_words(self.options, self.blinds)
         if self.lit:
             yield light_words(room)
         if "eye" in self.parts:
-            yield eye_words(self.options, shaded=self.shaded)
+            yield eye_words(self.options, self.blinds)
             yield from dict.fromkeys(self.eye_notes)
         if "heat" in self.parts:
-            template = (
-                N_(
-                    "Temperatures for rules without a set-up are without heating and cooling, with "
-                    "blinds closed by the rule of LM-83, {air_changes:g} air changes per hour and "
-                    "gains in the hours of use."
-                )
-                if self.shaded
-                else N_(
-                    "Temperatures for rules without a set-up are without heating and cooling, "
-                    "without blinds, with "
-                    "{air_changes:g} air changes per hour and gains in the hours of use."
-                )
+            template = N_(
+                "Temperatures for rules without a set-up are without heating and cooling, with {blinds}, "
+                "{air_changes:g} air changes per hour and gains in the hours of use."
             )
             if any("heat" in r.parts and not r.setup for r in self.files.rules.values()):
-                yield Note(template, air_changes=room.infiltration_ach)
+                yield Note(template, blinds=self.blinds, air_changes=room.infiltration_ach)
         if "open" in self.parts and self.calendar.median_diffuse is None:
             yield Note("The daylight factor method is not available: there is no diffuse daylight in the weather file.")
         elif "open" in self.parts and not self.calendar.stated_illuminance:
@@ -645,32 +676,38 @@ class Check:
             )
 
 
-def glare_words(options: ComplyOptions, *, shaded: bool) -> str:
-    """How glare is rated; `shaded`: with real blinds."""
+def glare_words(options: ComplyOptions, blinds: str) -> str:
+    """How glare is rated; blinds: `blinds_words`."""
     seats = Note("one seat in the middle of each room")
     if options.grid is not None:
         seats = Note("seats spaced {distance:g} m", distance=options.grid)
+    start, end = options.room.occupancy.hours
     return Note(
         "Glare is rated with {blinds}, {seats}, daily from {start} to {end} o'clock, with pictures of {pixels} pixels.",
+        blinds=blinds,
         seats=seats,
         pixels=options.room.outputs.picture_size,
-        **_blinds_and_hours(options, shaded=shaded),
+        start=start,
+        end=end,
     )
 
 
-def eye_words(options: ComplyOptions, *, shaded: bool) -> str:
-    """Whose light at the eye is judged."""
+def eye_words(options: ComplyOptions, blinds: str) -> str:
+    """Whose light at the eye is judged; blinds: `blinds_words`."""
+    start, end = options.room.occupancy.hours
     return Note(
         "Light at the eye is that of one view in each room, with {blinds}, daily from {start} to {end} o'clock.",
-        **_blinds_and_hours(options, shaded=shaded),
+        blinds=blinds,
+        start=start,
+        end=end,
     )
 
 
-def _blinds_and_hours(options: ComplyOptions, *, shaded: bool) -> dict[str, object]:
-    """In which state of the blinds and in which hours the view of an eye is judged."""
-    start, end = options.room.occupancy.hours
-    blinds = Note("blinds closed by the rule of LM-83") if shaded else Note("all blinds open")
-    return {"blinds": blinds, "start": start, "end": end}
+def blinds_words(shaded: bool, operation: Operation | None) -> str:
+    """How blinds move where glare, temperatures and light at the eye are judged; shaded: real blinds."""
+    if shaded and operation is not None:
+        return Note("blinds moved as in {file}", file=operation.file.name)
+    return Note("blinds closed by the rule of LM-83") if shaded else Note("all blinds open")
 
 
 def light_words(room: RoomOptions) -> str:

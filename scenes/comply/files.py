@@ -43,6 +43,8 @@ def read_files(options: ComplyOptions) -> ComplyFiles:
     if options.building is None or options.weather is None:
         raise ValueError("a check of files needs a building and a weather")
     check_building(options)
+    if options.operation is not None and options.closed is not None:
+        raise DataError("the operation file has the closed state: its last [[system]]", field="--closed")
     rules = {
         Path(name).stem if name[-5:] == ".toml" else rule_named(name): read_rule(name) for name in options.standards
     }

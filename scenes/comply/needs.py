@@ -8,18 +8,16 @@ hours are those of use or all, of some months and clock hours.
 from __future__ import annotations
 
 import math
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from mitsuba_cfs.metrics.autonomy import area_share, daylight_autonomy
 from mitsuba_cfs.metrics.en17037 import HALF_TIME, exceeded, reached_on_area
 from mitsuba_cfs.metrics.lm83 import annual_sunlight_exposure
-from scenes.comply.eye_needs import EyeDays, EyeShare
-from scenes.comply.findings import Findings, RoomHeat
-from scenes.comply.need import Clock, Need, at_clock
+from scenes.comply.findings import EyeLight, Findings, RoomHeat
 from scenes.language.catalogue import decimal, gettext, ngettext
 from scenes.language.numbers import listed
 from scenes.toml_file import Positive, Share, TomlTable
@@ -34,8 +32,61 @@ from thermal.comfort import (
 
 FloatArray = NDArray[np.float64]
 LONG = 60  # days after which the weights of an exponential mean are below 1e-5
-HEAT = frozenset({"heat"})
 Month = Annotated[int, Field(ge=1, le=12)]
+ROUNDING = 1e-9  # of shares of an area
+Clock = Annotated[int, Field(ge=0, le=24)]
+
+
+class Need(TomlTable):
+    """A limit of a quantity of a room."""
+
+    what: str  # each need's own name, by which a rule asks for it
+    at_least: float | None = None
+    at_most: float | None = None
+
+    parts: ClassVar[frozenset[str]] = frozenset()  # of `Findings` that it needs
+    unit: ClassVar[str] = ""  # "%" values are shares and shown times 100
+    digits: ClassVar[int] = 0
+
+    def __init_subclass__(
+        cls, parts: str | None = None, unit: str | None = None, digits: int | None = None, **options: Unpack[ConfigDict]
+    ) -> None:
+        super().__init_subclass__(**options)
+        given = {"parts": None if parts is None else frozenset(parts.split()), "unit": unit, "digits": digits}
+        for name, value in given.items():
+            if value is not None:
+                setattr(cls, name, value)
+
+    @model_validator(mode="after")
+    def _has_one_limit(self) -> Need:
+        if (self.at_least is None) == (self.at_most is None):
+            raise ValueError("expected either at_least or at_most")
+        return self
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        raise NotImplementedError
+
+    def value(self, room: Findings) -> float | None:
+        """The quantity of a room; None where it was not computed."""
+        raise NotImplementedError
+
+    def met(self, value: float | None) -> bool | None:
+        """Whether a value keeps the limit; None where there is none."""
+        if value is None:
+            return None
+        if self.at_least is not None:
+            return value >= self.at_least - ROUNDING
+        return value <= (self.at_most or 0.0) + ROUNDING
+
+
+def at_clock(room: Findings, hours: tuple[int, int]) -> NDArray[np.bool_]:
+    """Whether each step [H] is within clock hours, which may pass midnight."""
+    start, end = hours
+    clock = room.calendar.times.hour.to_numpy()
+    inside = (clock >= start) & (clock < end)
+    return inside if start <= end else (clock >= start) | (clock < end)
 
 
 class LimitTable(TomlTable):
@@ -106,14 +157,12 @@ class LimitTable(TomlTable):
         return text
 
 
-class HeatNeed(Need):
+class HeatNeed(Need, parts="heat"):
     """A need of the operative temperature over counted hours."""
 
     all_hours: bool = False  # of the day, as in dwellings; else those of use
     months: tuple[Month, Month] | None = None  # first and last, inclusive
     hours: tuple[Clock, Clock] | None = None  # clock hours, past midnight too
-
-    parts: ClassVar[frozenset[str]] = HEAT
 
     def counted(self, room: Findings, heat: RoomHeat) -> NDArray[np.bool_]:
         """The hours [H] that count."""
@@ -162,14 +211,12 @@ class LimitedNeed(HeatNeed):
         return heat.operative_c - self.line.at(room, heat)
 
 
-class DegreeHours(LimitedNeed):
+class DegreeHours(LimitedNeed, unit="K h"):
     """Kelvin times hours in which the operative temperature is above a limit."""
 
     what: Literal["degree_hours"]
     # days count from the first to the last with this running mean outdoors [degC]
     season_from_c: float | None = None
-
-    unit: ClassVar[str] = "K h"
 
     @property
     def words(self) -> str:
@@ -198,16 +245,13 @@ class DegreeHours(LimitedNeed):
         return degree_hours(room.heat.operative_c[mask], limit, step_h=room.step_h)
 
 
-class HoursAbove(LimitedNeed):
+class HoursAbove(LimitedNeed, unit="h", digits=1):
     """Counted hours in which a limit is exceeded, or their share."""
 
     what: Literal["hours_above"]
     by_k: float = 0.0  # kelvin above the limit from which an hour counts; 0: any excess
     rounded: bool = False  # the excess is rounded to whole kelvin first
     share: bool = False  # of the counted hours
-
-    unit: ClassVar[str] = "h"
-    digits: ClassVar[int] = 1
 
     @property
     def words(self) -> str:
@@ -236,12 +280,10 @@ class HoursAbove(LimitedNeed):
         return float(count * room.step_h)
 
 
-class DayWeighted(LimitedNeed):
+class DayWeighted(LimitedNeed, unit="K h"):
     """CIBSE TM52: excess of a day in whole kelvin times hours, of the worst day."""
 
     what: Literal["worst_day"]
-
-    unit: ClassVar[str] = "K h"
 
     @property
     def words(self) -> str:
@@ -261,12 +303,10 @@ class DayWeighted(LimitedNeed):
         return float(excess.reshape(-1, round(24 / room.step_h)).sum(axis=1).max() * room.step_h)
 
 
-class GreatestExcess(LimitedNeed):
+class GreatestExcess(LimitedNeed, unit="K"):
     """CIBSE TM52: greatest excess over a limit in whole kelvin."""
 
     what: Literal["greatest_excess"]
-
-    unit: ClassVar[str] = "K"
 
     @property
     def words(self) -> str:
@@ -288,15 +328,12 @@ def to_whole_kelvin(excess: FloatArray) -> FloatArray:
     return np.floor(excess + 0.5)
 
 
-class ComfortShare(HeatNeed):
+class ComfortShare(HeatNeed, unit="%", digits=1):
     """Share of the hours of use in which the operative temperature is in an adaptive band."""
 
     what: Literal["comfort"]
     band: Literal["EN 16798-1 I", "EN 16798-1 II", "EN 16798-1 III"]
     cold_from_c: float = -math.inf  # running mean outdoors from which the lower limit holds
-
-    unit: ClassVar[str] = "%"
-    digits: ClassVar[int] = 1
 
     @property
     def words(self) -> str:
@@ -330,15 +367,12 @@ class ComfortShare(HeatNeed):
         return float(np.mean(kept[counted])) if counted.any() else None
 
 
-class ReachedLux(Need):
+class ReachedLux(Need, parts="open", unit="lx"):
     """EN 17037, method 2: illuminance that a share of the area has for a share of the time."""
 
     what: Literal["reached_lux"]
     area: Share
     time: Share = HALF_TIME
-
-    parts: ClassVar[frozenset[str]] = frozenset({"open"})
-    unit: ClassVar[str] = "lx"
 
     @property
     def words(self) -> str:
@@ -359,7 +393,7 @@ class ReachedLux(Need):
         return float(exceeded(reached_on_area(values, weights, self.area), self.time))
 
 
-class ReachedFactor(Need):
+class ReachedFactor(Need, parts="open", unit="lx"):
     """EN 17037, method 1: daylight factor of a share of the area, times the median diffuse light.
 
     The standard's limits of the daylight factor are D_T = E_T/E_v,d,med.
@@ -367,9 +401,6 @@ class ReachedFactor(Need):
 
     what: Literal["reached_factor"]
     area: Share
-
-    parts: ClassVar[frozenset[str]] = frozenset({"open"})
-    unit: ClassVar[str] = "lx"
 
     @property
     def words(self) -> str:
@@ -390,16 +421,13 @@ class ReachedFactor(Need):
         return reached * room.median_diffuse
 
 
-class ViewShare(Need):
+class ViewShare(Need, parts="view", unit="%"):
     """EN 17037: share of the utilised area with a sight angle, a distance and layers at once."""
 
     what: Literal["view"]
     angle_deg: Positive
     distance: Positive
     layers: Annotated[int, Field(ge=1, le=3)]
-
-    parts: ClassVar[frozenset[str]] = frozenset({"view"})
-    unit: ClassVar[str] = "%"
 
     @property
     def words(self) -> str:
@@ -421,14 +449,10 @@ class ViewShare(Need):
         return room.view.share(self.angle_deg, self.distance, self.layers)
 
 
-class SunHours(Need):
+class SunHours(Need, parts="sun", unit="h", digits=2):
     """EN 17037: hours of possible sun at the openings on the chosen day."""
 
     what: Literal["sun_hours"]
-
-    parts: ClassVar[frozenset[str]] = frozenset({"sun"})
-    unit: ClassVar[str] = "h"
-    digits: ClassVar[int] = 2
 
     @property
     def words(self) -> str:
@@ -440,15 +464,11 @@ class SunHours(Need):
         return None if room.sun is None else room.sun.hours
 
 
-class DgpExceeded(Need):
+class DgpExceeded(Need, parts="glare", unit="%", digits=1):
     """EN 17037: share of the hours of use in which DGP is above, at the worst of the seats."""
 
     what: Literal["dgp_exceeded"]
     limit: Share
-
-    parts: ClassVar[frozenset[str]] = frozenset({"glare"})
-    unit: ClassVar[str] = "%"
-    digits: ClassVar[int] = 1
 
     @property
     def words(self) -> str:
@@ -463,13 +483,10 @@ class DgpExceeded(Need):
         return None if room.glare is None else room.glare.exceeded(self.limit)
 
 
-class ViewFree(Need):
+class ViewFree(Need, parts="open operated", unit="%"):
     """Share of LM-83's hours in which one sees out through some window, blinds operated."""
 
     what: Literal["view_free"]
-
-    parts: ClassVar[frozenset[str]] = frozenset({"open", "operated"})
-    unit: ClassVar[str] = "%"
 
     @property
     def words(self) -> str:
@@ -483,16 +500,12 @@ class ViewFree(Need):
         return float(np.mean(room.light.free[room.ten_hours].any(axis=1)))
 
 
-class SpatialAutonomy(Need):
+class SpatialAutonomy(Need, parts="open operated", unit="%", digits=1):
     """IES LM-83: share of the area that has an illuminance for a share of the ten hours a day."""
 
     what: Literal["sda"]
     lux: Positive
     time: Share
-
-    parts: ClassVar[frozenset[str]] = frozenset({"open", "operated"})
-    unit: ClassVar[str] = "%"
-    digits: ClassVar[int] = 1
 
     @property
     def words(self) -> str:
@@ -511,16 +524,12 @@ class SpatialAutonomy(Need):
         return area_share(autonomy >= self.time)
 
 
-class SunlightExposure(Need):
+class SunlightExposure(Need, parts="open", unit="%", digits=1):
     """IES LM-83: share of the area with direct sun for more than some hours, blinds open."""
 
     what: Literal["ase"]
     lux: Positive
     hours: Positive
-
-    parts: ClassVar[frozenset[str]] = frozenset({"open"})
-    unit: ClassVar[str] = "%"
-    digits: ClassVar[int] = 1
 
     @property
     def words(self) -> str:
@@ -540,17 +549,13 @@ class SunlightExposure(Need):
         )
 
 
-class Equinox(Need):
+class Equinox(Need, parts="open", unit="%", digits=1):
     """LEED, option 2: share of the area within limits at clear hours round the equinoxes."""
 
     what: Literal["equinox"]
     low: Positive
     high: Positive
     clocks: tuple[int, ...]
-
-    parts: ClassVar[frozenset[str]] = frozenset({"open"})
-    unit: ClassVar[str] = "%"
-    digits: ClassVar[int] = 1
 
     @property
     def words(self) -> str:
@@ -573,14 +578,11 @@ class Equinox(Need):
         return area_share(kept)
 
 
-class MeanHours(Need):
+class MeanHours(Need, parts="open", unit="h"):
     """BREEAM: hours of the year in which the mean illuminance of the room is reached."""
 
     what: Literal["mean_hours"]
     lux: Positive
-
-    parts: ClassVar[frozenset[str]] = frozenset({"open"})
-    unit: ClassVar[str] = "h"
 
     @property
     def words(self) -> str:
@@ -595,14 +597,11 @@ class MeanHours(Need):
         return float(room.step_h * np.count_nonzero(enough))
 
 
-class WorstHours(Need):
+class WorstHours(Need, parts="open", unit="h"):
     """BREEAM: hours of the year in which the worst lit point has an illuminance."""
 
     what: Literal["worst_hours"]
     lux: Positive
-
-    parts: ClassVar[frozenset[str]] = frozenset({"open"})
-    unit: ClassVar[str] = "h"
 
     @property
     def words(self) -> str:
@@ -616,16 +615,12 @@ class WorstHours(Need):
         return float(room.light.hours_at_points(self.lux, room.step_h).min())
 
 
-class PointHours(Need):
+class PointHours(Need, parts="open", unit="%", digits=1):
     """BREEAM, sales areas: share of the area that has an illuminance for so many hours a year."""
 
     what: Literal["point_hours"]
     lux: Positive
     hours: Positive
-
-    parts: ClassVar[frozenset[str]] = frozenset({"open"})
-    unit: ClassVar[str] = "%"
-    digits: ClassVar[int] = 1
 
     @property
     def words(self) -> str:
@@ -641,17 +636,13 @@ class PointHours(Need):
         return area_share(room.light.hours_at_points(self.lux, room.step_h) >= self.hours)
 
 
-class LightingEnergy(Need):
+class LightingEnergy(Need, parts="open", unit="kWh/(m² a)", digits=1):
     """Yearly energy of lamps that are dimmed to what daylight lacks, per floor area (LENI)."""
 
     what: Literal["leni"]
     lux: Positive  # that lamps and daylight keep together
     power_w_m2: Positive  # of the lamps where there is no daylight
     standby_kwh_m2: Annotated[float, Field(ge=0)] = 0.0  # of controls and emergency lights, a year
-
-    parts: ClassVar[frozenset[str]] = frozenset({"open"})
-    unit: ClassVar[str] = "kWh/(m² a)"
-    digits: ClassVar[int] = 1
 
     @property
     def words(self) -> str:
@@ -673,6 +664,99 @@ class LightingEnergy(Need):
         lacking = np.maximum(1.0 - light[room.ten_hours] / self.lux, 0.0)
         hours = room.step_h * float(lacking.mean(axis=1, dtype=float).sum())
         return self.power_w_m2 * hours / 1000 + self.standby_kwh_m2
+
+
+class EyeNeed(Need, parts="eye", unit="%", digits=1):
+    """A need of the light at the eye of a seat."""
+
+    lux: Positive
+    quantity: Literal["melanopic EDI", "illuminance"] = "melanopic EDI"
+    light: Literal["daylight", "lamps"] = "daylight"  # by lamps alone, at full power
+
+    @property
+    def light_words(self) -> str:
+        """The light in words."""
+        names = {
+            ("melanopic EDI", "daylight"): gettext(
+                "{lux} lx of melanopic EDI at the eye by daylight", lux=f"{self.lux:g}"
+            ),
+            ("melanopic EDI", "lamps"): gettext("{lux} lx of melanopic EDI at the eye by lamps", lux=f"{self.lux:g}"),
+            ("illuminance", "daylight"): gettext("{lux} lx at the eye by daylight", lux=f"{self.lux:g}"),
+            ("illuminance", "lamps"): gettext("{lux} lx at the eye by lamps", lux=f"{self.lux:g}"),
+        }
+        return names[self.quantity, self.light]
+
+    def enough(self, eye: EyeLight) -> NDArray[np.bool_] | None:
+        """The hours of use [H] with enough light; None where the lamps' light is not known."""
+        row = int(self.quantity == "melanopic EDI")
+        if self.light == "daylight":
+            return eye.occupied & (eye.daylight[row] >= self.lux)
+        if eye.lamps is None:
+            return None
+        return eye.occupied & np.full(len(eye.occupied), eye.lamps[row] >= self.lux)
+
+
+class EyeShare(EyeNeed):
+    """Share of the hours of use between clock hours with enough light at the eye."""
+
+    what: Literal["eye_share"]
+    between: tuple[Clock, Clock] = (0, 24)
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        start, end = self.between
+        return gettext(
+            "share of the hours of use from {start} to {end} o'clock with {light}",
+            start=start,
+            end=end,
+            light=self.light_words,
+        )
+
+    def value(self, room: Findings) -> float | None:
+        """Share, 0 to 1."""
+        enough = None if room.eye is None else self.enough(room.eye)
+        if room.eye is None or enough is None:
+            return None
+        counted: NDArray[np.bool_] = room.eye.occupied & at_clock(room, self.between)
+        return float(enough[counted].mean()) if counted.any() else None
+
+
+class EyeDays(EyeNeed):
+    """Share of the days of use on which enough light lasts, without a break, from before a clock hour."""
+
+    what: Literal["eye_days"]
+    hours: Positive  # on end
+    begins_by: Clock = 24
+
+    @property
+    def words(self) -> str:
+        """The quantity in words."""
+        values = {"hours": decimal(f"{self.hours:g}"), "light": self.light_words}
+        if self.begins_by == 24:
+            return gettext("share of the days of use with {hours} h on end of {light}", **values)
+        return gettext(
+            "share of the days of use with {hours} h on end of {light}, from {clock} o'clock at the latest",
+            clock=self.begins_by,
+            **values,
+        )
+
+    def value(self, room: Findings) -> float | None:
+        """Share, 0 to 1."""
+        enough = None if room.eye is None else self.enough(room.eye)
+        if room.eye is None or enough is None:
+            return None
+        steps = round(24 / room.step_h)
+        days = enough.reshape(-1, steps)
+        used = np.flatnonzero(room.eye.occupied.reshape(-1, steps).any(axis=1))
+        length = math.ceil(self.hours / room.step_h - ROUNDING)
+        if not len(used):
+            return None
+        if length > steps:
+            return 0.0
+        runs = np.asarray(np.lib.stride_tricks.sliding_window_view(days, length, axis=1).all(axis=2))
+        starts = np.arange(runs.shape[1]) * room.step_h <= self.begins_by
+        return float((runs[used] & starts).any(axis=1).mean())
 
 
 AnyNeed = Annotated[

@@ -13,7 +13,7 @@ OTHER_ALTITUDE_DEG = 13.0  # where a rule has none for the country: the greatest
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ComplyOptions(InputOptions):
-    """Options of a check against rules; `system` is that of the open state."""
+    """Options of a check against rules; `system` is that of the open state, `operation` moves the blinds."""
 
     standards: tuple[str, ...]  # names of `rules.rule_names`, or rule files
     room: RoomOptions = field(default_factory=RoomOptions)  # how each room is computed

@@ -85,20 +85,35 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
         both = len(asked) == 2
         all_of_them = ngettext("The one room meets it.", "All {count} rooms meet it.", len(asked))
         parts.append(gettext("Both rooms meet it.") if both else all_of_them)
+        parts += _least_favourable(asked)
     if unknown and len(unknown) < len(asked):  # else the level says so
         parts.append(gettext("Not computed: {rooms}.", rooms=_names(unknown)))
     rule = result.rules[verdict.rule]
     of_glare = any("glare" in need.parts for level in verdict.criterion.level for need in level.needs)
     if unknown and not rule.fits(result.weather):
-        parts.append(gettext("It asks for the weather of {sites}.", sites=", ".join(rule.sites)))
+        parts.append(gettext("It asks for the weather of {sites}.", sites=rule.weather_asked))
     elif unknown and of_glare and all(room.light is None or room.light.glare is None for room, _ in asked):
         parts.append(gettext("Annual glare was not asked for."))
     rated = [room.light.glare for room, _ in asked if room.light is not None and room.light.glare is not None]
     if rated and of_glare:
         operated = any(glare.operated for glare in rated)
-        blinds = gettext("blinds closed by the rule of LM-83") if operated else gettext("all blinds open")
+        blinds = translated(result.blinds) if operated else gettext("all blinds open")
         parts.append(gettext("Rated with {blinds}.", blinds=blinds))
     return " ".join(parts)
+
+
+def _least_favourable(asked: Sequence[tuple[CheckedRoom, RoomVerdict]]) -> Iterator[str]:
+    """The room nearest to the limit, where the criterion is one value against one limit."""
+    (_, first), *_ = asked
+    if len(first.criterion.level) > 1 or len(first.criterion.level[0].needs) > 1:
+        return
+    (need,) = first.criterion.level[0].needs
+    sign = 1.0 if need.at_least is not None else -1.0
+    room, worst = min(asked, key=lambda one: sign * (one[1].values[0][0] or 0.0))
+    value = shown(need, worst.values[0][0])
+    yield gettext(
+        "Least favourable: {room} ({value}, limit {limit}).", room=room.space.label, value=value, limit=limit_of(need)
+    )
 
 
 def _short_of(room: str, verdict: RoomVerdict) -> str:

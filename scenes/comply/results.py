@@ -13,7 +13,7 @@ from bim.report.issue import Issue
 from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.assess import BuildingVerdict, RoomVerdict
 from scenes.comply.findings import Calendar, SeatGlare
-from scenes.comply.need import Need
+from scenes.comply.needs import Need
 from scenes.comply.rules import RuleTable
 from scenes.comply.sunlight import SunDay, SunExposure
 from scenes.comply.uses import RoomUse
@@ -76,3 +76,4 @@ class Compliance:
     notes: tuple[str, ...]
     issues: tuple[Issue, ...]
     seconds: dict[str, float]  # by part
+    blinds: str = ""  # how they move where glare, temperatures and light at the eye are judged, in words

@@ -11,8 +11,7 @@ from pydantic import Field, model_validator
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.weather import Weather
-from scenes.comply.need import Need
-from scenes.comply.needs import AnyNeed
+from scenes.comply.needs import AnyNeed, Need
 from scenes.language.catalogue import N_
 from scenes.room.operation_tables import OperationTables
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
@@ -109,6 +108,12 @@ class RuleTable(TomlTable):
     def fits(self, weather: Weather) -> bool:
         """Whether the weather is one that the rule asks for."""
         return not self.sites or _named(weather, self.sites)
+
+    @property
+    def weather_asked(self) -> str:
+        """The weather that the rule, or one of its criteria, asks for: the first word of each list."""
+        lists = (self.weather, *(one.weather for one in self.criterion))
+        return ", ".join(dict.fromkeys(words[0] for words in lists if words))
 
     @property
     def sites(self) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 import pandas as pd
 
 from scenes.comply.assess import NOT_FOR_IT, RoomVerdict
-from scenes.comply.need import Need
+from scenes.comply.needs import Need
 from scenes.comply.results import CheckedRoom, Compliance
 from scenes.comply.rules import NOT_MET, CriterionTable, LevelTable
 from scenes.comply.uses import RoomUse

@@ -11,8 +11,7 @@ import numpy as np
 from bim.model import Space
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.classes import CLASSES, LIMITS
-from scenes.comply.need import Need
-from scenes.comply.needs import DgpExceeded, ReachedLux, SpatialAutonomy, SunlightExposure
+from scenes.comply.needs import DgpExceeded, Need, ReachedLux, SpatialAutonomy, SunlightExposure
 from scenes.comply.rules import LevelTable, read_rule
 from scenes.language.catalogue import N_
 from scenes.study.store import CaseResult

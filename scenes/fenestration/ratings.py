@@ -12,7 +12,7 @@ from mitsuba_cfs.bsdf.spectral_pane import SpectralRating, spectral_rating
 from mitsuba_cfs.errors import DataError
 from scenes.fenestration.systems import FenestrationSystem, read_system
 from scenes.fenestration.thermal_system import ThermalSystem, checked_system, sun_in_layers
-from thermal.blackbox import as_surface
+from thermal.blackbox import TABLE_HEAD, LayerResistance
 from thermal.errors import ThermalInputError
 from thermal.ratings import CLASSES, EUROPEAN, REFERENCE_GLAZINGS, ThermalRating, layered_ratings, shade_ratings
 
@@ -111,16 +111,32 @@ def thermal_toml(state: RatedState) -> str:
         lines.append(f'shading_position = "{state.system.shading_position}"')
     films = state.heat.fenestration.in_series()
     resistance = films.layer_resistance
-    if resistance.kind == "table":
-        resistance = as_surface(resistance)
-    if resistance.kind == "surface":
-        lines.append(f"surface = [{', '.join(f'{c:.6g}' for c in resistance.coefficients)}]")
+    if resistance.kind in ("surface", "table"):
+        lines.append(_resistance_toml(resistance))
         closed = state.heat.model
         if "films" in closed and films.extra_inner > 0:
             lines.append(f"realised_inner_resistance = {films.r_inner:.4f}  # [m2 K/W]")
         if "films" in closed and films.extra_outer > 0:
             lines.append(f"realised_outer_resistance = {films.r_outer:.4f}  # [m2 K/W]")
     return "\n".join(lines) + "\n"
+
+
+def _resistance_toml(resistance: LayerResistance) -> str:
+    """R(T_m, dT) as `[[system]]` reads it; as one line, which may stand before other keys."""
+    values = resistance.coefficients
+    if resistance.kind == "surface":
+        return f"surface = [{_numbers(values)}]"
+    axes = []
+    for first, step, count in (values[0:3], values[3:6]):
+        axes.append([first + k * step for k in range(int(count))])
+    mean, apart = axes
+    rows = [values[TABLE_HEAD + k * len(apart) :][: len(apart)] for k in range(len(mean))]
+    grid = f"mean_c = [{_numbers(mean)}], difference_k = [{_numbers(apart)}]"
+    return f"conductance = {{ {grid}, values = [{', '.join(f'[{_numbers(row)}]' for row in rows)}] }}  # [W/(m2 K)]"
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:.6g}" for value in values)
 
 
 def printed(rows: Sequence[dict[str, object]]) -> list[str]:

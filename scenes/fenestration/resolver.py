@@ -421,7 +421,7 @@ def glazing_system(values: StatedValues, file: str, digits: int = 3) -> Fenestra
     """
     u = TYPICAL_SYSTEMS["none"][0] if values.u_value is None else values.u_value
     panes = values.panes or (1 if u > HIGH_U else 2)
-    name = "glazing, " + _in_words(values, digits)
+    name = Note("glazing, {values}", values=_in_words(values, digits))
     if values.glass is None:
         front, back = visible_reflectances(values.visible)
         clear = Glazing(name, values.visible, front, back, panes)
@@ -479,9 +479,17 @@ def glazing_system(values: StatedValues, file: str, digits: int = 3) -> Fenestra
     )
 
 
-def _in_words(values: StatedValues, digits: int) -> str:
-    parts = {"U": values.u_value, "g": values.g_value, "visible transmittance": values.visible}
+def _in_words(values: StatedValues, digits: int) -> Note:
+    def rounded(value: float) -> float:
+        return float(f"{value:.{digits}g}")
+
+    parts = {}
+    if values.u_value is not None:
+        parts["u"] = Note("U {value:g}", value=rounded(values.u_value))
+    if values.g_value is not None:
+        parts["g"] = Note("g {value:g}", value=rounded(values.g_value))
+    if values.visible is not None:
+        parts["visible"] = Note("visible transmittance {value:g}", value=rounded(values.visible))
     if values.solar is not None:
-        parts["solar transmittance"] = values.solar
-    stated = ((name, value) for name, value in parts.items() if value is not None)
-    return ", ".join(f"{name} {value:.{digits}g}" for name, value in stated)
+        parts["solar"] = Note("solar transmittance {value:g}", value=rounded(values.solar))
+    return Note(", ".join(f"{{{key}}}" for key in parts), **parts)

@@ -23,6 +23,7 @@ Paths are relative to the TOML file.  The angular function is for the visible ba
 from __future__ import annotations
 
 import csv
+import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -44,6 +45,7 @@ from mitsuba_cfs.bsdf.spectral_pane import (
     SpectralPane,
     read_glazing_layers,
     read_pane_file,
+    read_product_file,
     read_spectral_pane,
     spectral_glazing,
 )
@@ -52,6 +54,7 @@ from mitsuba_cfs.files import reason, write_text
 from mitsuba_cfs.spectra.detectors import NANOMETRES
 from scenes import plausible
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
+from thermal.blackbox import LayerResistance, conductance_table
 from thermal.closure import U_MODELS, Closure
 from thermal.errors import ThermalInputError
 from thermal.gases import GAS_NAMES
@@ -72,7 +75,8 @@ ANGULAR_OPTIONAL = ("reflectance_front", "reflectance_back")
 SPECTRUM_COLUMNS = ("wavelength_nm", "transmittance")
 WIDEST_GAP_NM = 50.0  # between visible data of a pane, which files have every 5 to 20 nm
 REFLECTANCE_COLUMNS = ("wavelength_nm", "reflectance")
-SLAT_STEP = 10  # nanometres between the columns of a file of coloured slats
+SLAT_STEP = 10  # nanometres between the reflectances in a file of coloured slats
+SLAT_NAMES = ("wavelength_nm", "reflectance", "shares")  # of that file
 SPECTRUM_OPTIONAL = ("reflectance",)  # of the side of a shade that faces the panes
 Film = Annotated[Positive, plausible.RESISTANCE]  # [m2 K/W]
 PATCHES = KLEMS_FULL.size
@@ -80,7 +84,7 @@ ByPatch = Annotated[tuple[float, ...], Field(min_length=PATCHES, max_length=PATC
 Table = TypeVar("Table", bound="ClosureTable")
 WindowTable = TypeVar("WindowTable", bound="WindowHeatTable")
 # the model of U that a key belongs to
-OF_MODEL = {"gap": "gap", "surface": "surface", "layers": "layers", "u_slope": "linear"}
+OF_MODEL = {"gap": "gap", "surface": "surface", "conductance": "surface", "layers": "layers", "u_slope": "linear"}
 SHADES = ("slats", "threads", "holes", "openness")  # what makes a layer a shade
 
 
@@ -322,6 +326,28 @@ class GapTable(TomlTable):
     emissivity: tuple[Share, Share] = (0.837, 0.03)  # of the two faces that bound it
 
 
+class ConductanceTable(TomlTable):
+    """Conductance between the outermost and the innermost face by their temperatures, on a regular grid."""
+
+    mean_c: Annotated[tuple[float, ...], Field(min_length=2)]  # mean of both faces [degC]
+    difference_k: Annotated[tuple[float, ...], Field(min_length=2)]  # between them [K]
+    values: tuple[tuple[Positive, ...], ...]  # [W/(m2 K)], one row for each mean
+
+    @model_validator(mode="after")
+    def _is_a_grid(self) -> ConductanceTable:
+        for name in ("mean_c", "difference_k"):
+            steps = np.diff(getattr(self, name))
+            if steps.min() <= 0 or np.ptp(steps) > 1e-6 * steps.max():
+                raise ValueError(f"{name}: expected values that rise by equal steps")
+        if {len(row) for row in self.values} != {len(self.difference_k)} or len(self.values) != len(self.mean_c):
+            raise ValueError(f"values: expected {len(self.mean_c)} rows of {len(self.difference_k)}")
+        return self
+
+    def resistance(self) -> LayerResistance:
+        """R(T_m, dT)."""
+        return conductance_table(self.mean_c, self.difference_k, self.values)
+
+
 class ClosureTable(TomlTable):
     """How a system's thermal model is closed: in a study, and beside a BSDF file."""
 
@@ -330,6 +356,7 @@ class ClosureTable(TomlTable):
     u_slope: Annotated[float, Field(ge=-0.05, le=0.05)] | None = None  # of U for "linear" [1/K]
     # 1/R = c0 + c1 x + c2 d + c3 d2 + c4 x d + c5 x2, see thermal.blackbox.LayerResistance
     surface: Annotated[tuple[float, ...], Field(min_length=6, max_length=6)] | None = None
+    conductance: ConductanceTable | None = None
     layers: tuple[GlazingLayerTable, ...] = ()  # outermost first: ISO 15099
     glazing_height: Annotated[Positive, plausible.LENGTH] = 1.5  # [m] of the layers
     glazing_width: Annotated[Positive, plausible.LENGTH] = 1.0  # [m]: open edges at its sides
@@ -344,7 +371,7 @@ class ClosureTable(TomlTable):
         if len(models) > 1:
             raise ValueError(f"{stated[0]} and {stated[1]} exclude each other")
         model = self.u_model
-        if model in ("gap", "surface", "layers") and model not in models:
+        if model in OF_MODEL.values() and model != "linear" and model not in models:
             raise ValueError(f'u_model "{model}" and {model} belong together')
         if model is not None and models and models != {model}:
             raise ValueError(f'{stated[0]}: belongs to u_model "{OF_MODEL[stated[0]]}"')
@@ -379,10 +406,16 @@ class ClosureTable(TomlTable):
             gap,
             self.realised_inner_resistance,
             self.realised_outer_resistance,
-            surface=self.surface,
+            surface=self._resistance(),
             unit=unit,
             **more,
         )
+
+    def _resistance(self) -> LayerResistance | None:
+        """R(T_m, dT) as stated, by coefficients or by a table."""
+        if self.conductance is not None:
+            return self.conductance.resistance()
+        return None if self.surface is None else LayerResistance("surface", self.surface)
 
 
 PEAK_SHARES = {"specular": 1.0, "lobe": 0.0}  # that pass straight on
@@ -393,7 +426,7 @@ class SpectralTable(TomlTable):
 
     panes: tuple[Path, ...] = ()  # Optics or IGSDB files
     shade: Path | None = None  # CSV file of `SPECTRUM_COLUMNS`
-    slats: Path | None = None  # CSV file that `cfs bsdf generate` writes of a coloured blind
+    slats: Path | None = None  # JSON file that `cfs bsdf generate` writes of a coloured blind
 
     @model_validator(mode="after")
     def _has_some(self) -> SpectralTable:
@@ -462,33 +495,33 @@ def read_spectrum(path: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]
     return np.interp(NANOMETRES, nm, tau), np.interp(NANOMETRES, nm, rho)
 
 
-SLAT_NAMES = ("patch", "straight")  # columns of the file of coloured slats, before those of its wavelengths
-
-
 def write_slat_light(light: SlatLight, path: Path) -> None:
-    """A CSV file of coloured slats: a row for each patch of incidence, a column for each ten nanometres."""
-    some = np.arange(0, len(NANOMETRES), SLAT_STEP)
-    patches = np.arange(1, KLEMS_FULL.size + 1)
-    head = [*SLAT_NAMES, *(f"{nm:g}" for nm in NANOMETRES[some])]
-    rows = np.column_stack([patches, light.straight, light.whole[:, some]])
-    lines = [",".join(head), *(",".join(f"{value:.5g}" for value in row) for row in rows)]
-    write_text(path, "\n".join(lines) + "\n")
+    """A JSON file of coloured slats: reflectance, and shares [n][emergent][incident] that are reflected n times."""
+    document = {
+        "wavelength_nm": NANOMETRES[::SLAT_STEP].tolist(),
+        "reflectance": [round(value, 5) for value in light.reflectance[::SLAT_STEP].tolist()],
+        "shares": np.round(light.shares, 4).tolist(),
+    }
+    write_text(path, json.dumps(document, separators=(",", ":")) + "\n")
 
 
 def read_slat_light(path: Path) -> SlatLight:
-    """The transmittance of coloured slats of a file that `write_slat_light` wrote.
+    """The colour of the slats of a file that `write_slat_light` wrote.
 
-    Raises: `DataError` for a file that is no such table.
+    Raises: `DataError` for another file.
     """
-    wanted = [f"{nm:g}" for nm in NANOMETRES[::SLAT_STEP]]
-    columns = csv_columns(path, (*SLAT_NAMES, *wanted))
-    if not np.array_equal(columns["patch"], np.arange(1, KLEMS_FULL.size + 1)):
-        raise DataError(f"expected a row for each of {KLEMS_FULL.size} patches", file=path, field="patch")
-    values = np.array([columns[name] for name in wanted]).T
-    if min(values.min(), columns["straight"].min()) < 0 or values.max() > 1:
-        raise DataError("expected transmittances from 0 to 1", file=path)
-    whole = np.array([np.interp(NANOMETRES, NANOMETRES[::SLAT_STEP], row) for row in values])
-    return SlatLight(columns["straight"], whole)
+    document, size = read_product_file(path), KLEMS_FULL.size
+    try:
+        nm, rho, shares = (np.array(document[name], dtype=float) for name in SLAT_NAMES)
+    except (KeyError, TypeError, ValueError):
+        raise DataError(f"expected numbers of {', '.join(SLAT_NAMES)}", file=path) from None
+    if shares.ndim != 3 or shares.shape[1:] != (size, size):
+        raise DataError(f"expected {size} x {size} patches for each number of reflections", file=path, field="shares")
+    if nm.shape != rho.shape or not np.array_equal(nm, NANOMETRES[::SLAT_STEP]):
+        raise DataError(f"expected a reflectance every {SLAT_STEP} nm from 380 to 780", file=path, field="reflectance")
+    if rho.min() < 0 or rho.max() > 1:
+        raise DataError("expected reflectances from 0 to 1", file=path, field="reflectance")
+    return SlatLight(np.interp(NANOMETRES, nm, rho), shares)
 
 
 def read_reflectance(path: Path) -> NDArray[np.float64]:

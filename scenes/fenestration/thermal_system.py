@@ -16,7 +16,7 @@ from mitsuba_cfs.bsdf.glazing import Pane, absorbed_by_layers
 from mitsuba_cfs.bsdf.klems import KlemsBsdf
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.notes import Note
-from scenes.fenestration.systems import FenestrationSystem
+from scenes.fenestration.systems import FenestrationSystem, NeighbourTilts
 from thermal.blackbox import Fenestration, LayerAbsorptances
 from thermal.closure import Closure
 from thermal.errors import ThermalInputError, require
@@ -80,9 +80,44 @@ class ThermalSystem:
         return Note("{system}: window model {model}.", system=self.fenestration.name, model=self.model)
 
 
-@lru_cache(maxsize=32)  # each room of a building asks for it again
+@lru_cache(maxsize=128)  # each room of a building asks for it again, of every tilt
 def thermal_system(system: FenestrationSystem) -> ThermalSystem:
     """U, g and layer absorptances by direction of a system."""
+    between = None if system.between is None else _between_tilts(system, system.between)
+    return _of_layers(system) if between is None else between
+
+
+def _between_tilts(system: FenestrationSystem, tilts: NeighbourTilts) -> ThermalSystem | None:
+    """The mean of the data at two tilts, the layers of the nearer; None where U or the nodes of the layers differ."""
+    low, high = thermal_system(tilts.low), thermal_system(tilts.high)
+    ends = low.fenestration, high.fenestration
+    shades = {None if one.shade is None else one.shade.exterior for one in ends}
+    if len(shades) > 1 or ends[0].u_value != ends[1].u_value:
+        return None
+    near, share = (low if tilts.share <= 0.5 else high), tilts.share
+
+    def mean(one: ArrayLike, other: ArrayLike) -> NDArray[np.float64]:
+        return (1 - share) * np.asarray(one) + share * np.asarray(other)
+
+    a, b = low.absorptances, high.absorptances
+    absorbed = LayerAbsorptances(
+        mean(a.outer, b.outer), mean(a.inner, b.inner), max(a.clipped, b.clipped), mean(a.middle, b.middle)
+    )
+    return replace(
+        near,
+        fenestration=replace(near.fenestration, name=system.name),
+        absorptances=absorbed,
+        transmittance=mean(low.transmittance, high.transmittance),
+        reflectance=mean(low.reflectance, high.reflectance),
+        g_value=mean(low.g_value, high.g_value),
+        back_reflectance=float(mean(low.back_reflectance, high.back_reflectance)),
+        back_absorptance=float(mean(low.back_absorptance, high.back_absorptance)),
+        notes=(),
+    )
+
+
+def _of_layers(system: FenestrationSystem) -> ThermalSystem:
+    """The data of a system by its layers, stated or typical."""
     solar = system.solar
     tau = np.minimum(solar.direct_hemispherical(solar.transmission_front), 1.0)  # to rounding
     rho = solar.direct_hemispherical(solar.reflection_front)

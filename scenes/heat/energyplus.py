@@ -1,14 +1,16 @@
-"""A study's rooms as EnergyPlus computes them, beside the study's own results."""
+"""Rooms as EnergyPlus computes them, beside the program's own results."""
 
 from __future__ import annotations
 
-from bim.energyplus_twin import EnergyPlusTwin, TwinAir, TwinRoom
-from bim.energyplus_windows import WindowOptics
+from typing import TYPE_CHECKING
+
+from bim.energyplus_twin import EnergyPlusTwin, TwinAir
 from mitsuba_cfs.errors import DataError
-from scenes.fenestration.thermal_system import thermal_system, window_optics
-from scenes.heat.study import BalancedRooms
-from scenes.heat.study_file import StudyFile
-from scenes.room.zone import climate
+from scenes.room.energyplus import twin_of_rooms
+
+if TYPE_CHECKING:
+    from scenes.heat.study import BalancedRooms
+    from scenes.heat.study_file import StudyFile
 
 
 def check_twin(study: StudyFile) -> None:
@@ -28,19 +30,6 @@ def energyplus_twin(study: StudyFile, balanced: BalancedRooms) -> EnergyPlusTwin
 
     Raises: `DataError` for what EnergyPlus cannot take.
     """
-    optics: dict[int, WindowOptics] = {}
-    rooms = []
-    for room in balanced.rooms:
-        windows = {w.guid: balanced.in_windows[w.guid] for w in room.space.windows}
-        for system in (one for states in windows.values() for one in states):
-            optics.setdefault(id(system), window_optics(system, thermal_system(system)))
-        of_window = {guid: [optics[id(system)] for system in states] for guid, states in windows.items()}
-        rooms.append(TwinRoom(room.space, room.room, of_window, room.shading.of_windows))
-    return EnergyPlusTwin(
-        balanced.building,
-        rooms,
-        climate(balanced.weather),
-        air=TwinAir(balanced.air_links, balanced.transfers),
-        terrain=study.terrain,
-        steps=60 // study.step_minutes,
-    )
+    air = TwinAir(balanced.air_links, balanced.transfers)
+    rooms = balanced.building, balanced.rooms, balanced.in_windows, balanced.weather
+    return twin_of_rooms(*rooms, air=air, terrain=study.terrain, steps=60 // study.step_minutes)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -40,6 +41,7 @@ from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.leaks import leak_issues
 from scenes.room.light import visible_scene
 from scenes.room.operation import (
+    Operation,
     OperationHours,
     check_schedules,
     ground_note,
@@ -49,6 +51,7 @@ from scenes.room.operation import (
 )
 from scenes.room.operation_tables import PlantTable
 from scenes.room.room import operated_zone
+from scenes.room.shared_states import with_shared_states
 from scenes.room.zone import RoomZone, balances, coupled, inner_sun_note
 from thermal.balance import ZoneResult
 from thermal.comfort import (
@@ -424,7 +427,18 @@ def _traced_rooms(
     progress: Progress,
 ) -> TracedRooms:
     """The rooms with these systems."""
-    traced = TracedRooms([], {}, [])
+    traced, building = TracedRooms([], {}, []), inputs.building
+    operation = with_shared_states(
+        Operation(study.building or Path(building.name), study, ()),
+        building,
+        inputs.spaces,
+        in_windows,
+        inputs.weather,
+        study.options,
+        skies=skies,
+        cache=cache,
+        progress=progress,
+    )
     for i, space in enumerate(inputs.spaces):
         steps = item(progress, "room", i + 1, len(inputs.spaces), space.label)
         room = room_inputs(
@@ -437,6 +451,7 @@ def _traced_rooms(
             skies=skies,
             cache=cache,
             together=[one.guid for one in inputs.spaces] if study.couple else (),
+            shared=None if operation is None else operation.shared,
         )
         if space.windows:
             scene, seed = visible_scene(room), study.options.sampling.seed
@@ -605,7 +620,7 @@ def study_inputs(study: StudyFile, files: HeatFiles | None = None, progress: Pro
     files, options = files or read_files(study), study.inputs
     building = building_or_box(study.box, options, progress)
     rooms = "all" if study.couple or study.box is not None else "glazed"
-    inputs = inputs_of(building, options, files.inputs, rooms=rooms, states=every_state)
+    inputs = inputs_of(building, options, files.inputs, rooms=rooms, states=every_state, tables=study)
     notes = *stated_note(building, "the study"), *unstated_note(study, building, "the study")
     inputs = replace(inputs, notes=(*notes, *ground_note(study)))
     return replace(inputs, spaces=shared_constructions(inputs.spaces)) if study.couple else inputs

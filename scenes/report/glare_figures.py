@@ -94,7 +94,7 @@ def colour_view(result: RunResult, glare: GlareResults, side: int) -> ColourView
     factor = int(np.ceil(max(radiance.shape) / side))
     return ColourView(
         title=spoken(result.times[glare.colour.hour]),
-        words=sun_words(result, glare.colour.hour),
+        words=f"{sun_words(result, glare.colour.hour)}; {gettext('white balance: daylight outdoors')}",
         seen=photo_uri(tone_mapped(reduced(radiance.astype(float), factor))),
         round=glare.view.is_disc,
     )

@@ -150,15 +150,22 @@ def sensors_table(room: RoomYear) -> Table:
 
 def problems_table(issues: Iterable[Issue]) -> Table:
     """What is wrong with the building's file and what was done about it."""
+    kinds = ranked(tuple(issues))
+    glazed = any(one.glass for one in kinds)  # a column of dashes says nothing
+    glass = (Column(gettext("Glass"), "m²"),) if glazed else ()
     columns = (
-        Column(gettext("Glass"), "m²"),
+        *glass,
         Column(gettext("Element"), numeric=False),
         Column(gettext("Problem"), numeric=False),
         Column(gettext("Treatment in the model"), numeric=False),
     )
     rows = tuple(
-        (cell(one.glass, 2) if one.glass else "–", one.first.where, *issue_cells(one.text("command", gettext)))
-        for one in ranked(tuple(issues))
+        (
+            *((cell(one.glass, 2) if one.glass else "–",) if glazed else ()),
+            one.first.where,
+            *issue_cells(one.text("command", gettext)),
+        )
+        for one in kinds
     )
     return Table(gettext("Problems by element"), columns, rows)
 

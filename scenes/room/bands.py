@@ -18,7 +18,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import ndtri
-from scipy.stats import qmc
 
 from mitsuba_cfs.metrics.en17037 import MINIMUM_AREA, TARGET_AREA
 from scenes.results import Bands
@@ -61,6 +60,8 @@ def deviations(tables: OperationTables | None) -> dict[str, float]:
 
 def draws(by: Mapping[str, float], seed: int) -> dict[str, Array]:
     """What is added to each input [N] of `INPUTS`."""
+    from scipy.stats import qmc  # its import takes half a second, and runs without bands do not draw
+
     sobol = qmc.Sobol(len(INPUTS), scramble=True, rng=np.random.default_rng(seed))
     normal = ndtri(np.clip(sobol.random(SAMPLES), 1e-9, 1 - 1e-9))
     return {key: by[key] * column for key, column in zip(INPUTS, normal.T, strict=True)}

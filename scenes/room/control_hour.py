@@ -262,7 +262,7 @@ def controlled_states(
     year = ControlYear(room, light, outdoors)
     if controller is None:
         return predictive_states(year, progress=progress)[:, room.windows.control]
-    run = ControlRun(year)
+    run, followed = ControlRun(year), room.followed
     previous = (0,) * len(run.year.groups)
     for h in range(hours):
         hour = ControlHour(run, h, previous)
@@ -271,6 +271,8 @@ def controlled_states(
             previous = run.year.combination(states, previous)
         except ValueError as error:
             raise ControlError(f"control at {hour.time:%m-%d %H:%M}: {error}") from None
+        if followed:
+            previous = tuple(int(followed[c].states[h]) if c in followed else s for c, s in enumerate(previous))
         run.states.append(previous)
         if h % AT_A_TIME == 0:
             progress("control", h / hours)

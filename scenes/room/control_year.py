@@ -19,7 +19,8 @@ from scenes.room.glare import rating_of
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
 from scenes.room.operation import OperationHours
-from scenes.room.shading import MOST_COMBINATIONS, Levels, Seat, group_states, seat_view, shading_states, slat_tilts_deg
+from scenes.room.shading import Levels, shading_states, slat_tilts_deg
+from scenes.room.shading_by_light import MOST_COMBINATIONS, Seat, seat_view
 from scenes.room.solar import SeasonalOutdoors, SunByStates, window_irradiance
 from scenes.room.window_sensors import window_beam
 from scenes.room.zone import (
@@ -61,7 +62,7 @@ class ControlYear:
         """From the stages of a room."""
         self.room, self.light, self.outdoors = room, light, outdoors
         self.groups = room.control.names
-        self.counts = tuple(group_states(room, c) for c in range(len(self.groups)))
+        self.counts = tuple(room.windows.states_of(c) for c in range(len(self.groups)))
         self._sensors: dict[tuple[int, ...], NDArray[np.float32]] = {}
         self._eyes: dict[tuple[Seat, tuple[int, ...]], FloatArray] = {}
         self._glare: dict[tuple[Seat, tuple[int, ...]], FloatArray] = {}

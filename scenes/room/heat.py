@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -192,6 +192,8 @@ def _comfort(
 
 
 Heat = tuple[ThermalResult, OperationResult | None]
+# called with rooms as they were balanced, and the air between them [Z, Z] [m3/s]
+OnZones = Callable[[Sequence[RoomZone], NDArray[np.float64]], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,6 +302,7 @@ def heat_of(
     air_links: NDArray[np.float64] | None = None,
     progress: Progress = silent,
     store: StoredArrays | None = None,
+    on_zone: Callable[[RoomZone], None] | None = None,
 ) -> list[Heat]:
     """Temperatures, comfort and loads of rooms that are balanced together.
 
@@ -307,6 +310,7 @@ def heat_of(
         step_s: of the balance [s].
         air_links: air between the rooms [Z, Z] [m3/s]; None: none.
         store: of balances and results on disk; None: in memory.
+        on_zone: called with each room as it was balanced.
     """
     results = balances(rooms, weather, step_s, air_links=air_links, terrain=terrain, progress=progress, store=store)
     passed = iter if store is None else store.each
@@ -320,6 +324,8 @@ def heat_of(
             values = {"hours": int(apart.sum()) * weather.step_h, "room": room.zone.name}
             found += (Issue("shading-by-coupled-temperature", room.space.guid, values),)
         room = moved
+        if on_zone is not None:
+            on_zone(room)
         comfort = (room.operation or OperationTables()).comfort
         felt = felt_by(comfort, balance, humidity)
         thermal = replace(thermal_result(room, balance, weather, felt), issues=found)
@@ -346,6 +352,7 @@ def coupled_years(
     *,
     store: StoredArrays | None = None,
     seed: int = 0,
+    on_zones: OnZones | None = None,
 ) -> tuple[list[RoomYear], tuple[str, ...]]:
     """The years of rooms that exchange heat through the parts between them, and notes on that.
 
@@ -353,10 +360,17 @@ def coupled_years(
         tables: of all rooms; terrain of the site, air through open doors.
         store: of the rooms' heat on disk; None: in memory.
         seed: of the samples for bands.
+        on_zones: called with the rooms as they were balanced.
     """
     progress("heat balance", 0.0)
     zones, links, _ = coupled([room.zone for room in rooms], tables.air.door_m3_s)
-    heats = heat_of(zones, weather, step_s, terrain=tables.terrain, air_links=links, progress=progress, store=store)
+    balanced: list[RoomZone] = []
+    on_zone = None if on_zones is None else balanced.append
+    heats = heat_of(
+        zones, weather, step_s, terrain=tables.terrain, air_links=links, progress=progress, store=store, on_zone=on_zone
+    )
+    if on_zones is not None:
+        on_zones(balanced, links)
     progress("heat balance", 1.0)
     if any(room.sensitivities is not None for room in rooms):
         derived = heat_sensitivities(zones, weather, step_s, terrain=tables.terrain, air_links=links)

@@ -19,6 +19,7 @@ from bim.doorways import THINNEST, light_sources, panes_between, panes_to_window
 from bim.model import Building, Element, Face, Space
 from bim.to_tracer import element_surfaces, exterior_surfaces, furnished_surfaces, reflectance_groups, window_groups
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
 from mitsuba_cfs.methods.light import SeasonalLight, group_shares
 from mitsuba_cfs.methods.optics import BsdfOptics, MatrixOptics, SystemOptics, straight_transmittance
 from mitsuba_cfs.methods.phase_light import PhaseLight
@@ -47,6 +48,7 @@ class InnerGlass:
     open_area: float  # of the doorways [m2]
     faces: frozenset[str]  # names of the room's faces that the glass replaces
     by_groups: SurfaceGroups  # of the interior
+    spectra: tuple[SpectralFactor, ...]  # [I] of the light of the rooms beyond
 
 
 def inner_glass(building: Building, space: Space, systems: Mapping[str, States]) -> InnerGlass | None:
@@ -71,7 +73,7 @@ def _inner_glass(
     for other in light_sources(building, space, away, below):
         pairs = panes_between(building.spaces, space)[other.guid]
         onward = _inner_glass(building, other, systems, away, away[other.guid])
-        scene, through = _room_beyond(building, other, pairs, systems, onward)
+        scene, through, spectrum = _room_beyond(building, other, pairs, systems, onward)
         used += [face for face, _ in pairs]
         for optics, group in _groups(space, [face for face, _ in pairs]):
             matrix_optics = MatrixOptics(optics.transmission, dark, reflection=optics.reflection)
@@ -80,14 +82,15 @@ def _inner_glass(
             beyond = AdjacentRoom(
                 scene, tuple(one.transmission for one in through), tuple(map(straight_transmittance, through)), beam
             )
-            panes.append((named, (matrix_optics,), beyond, other.label))
+            panes.append((named, (matrix_optics,), beyond, other.label, spectrum))
     if not panes:
         return None
     names = frozenset(face.name for face in used)
     rest = replace(space, faces=tuple(face for face in space.faces if face.name not in names))
     areas = [sum(f.area for f in used if f.pane.is_open == is_open) for is_open in (False, True)]
-    groups = map(tuple, zip(*panes, strict=True))
-    return InnerGlass(furnished_surfaces(rest), *groups, *areas, names, reflectance_groups(rest))
+    groups, optics, beyond_, labels, spectra = map(tuple, zip(*panes, strict=True))
+    interior, by_groups = furnished_surfaces(rest), reflectance_groups(rest)
+    return InnerGlass(interior, groups, optics, beyond_, labels, *areas, names, by_groups, spectra)
 
 
 def borrowed_share(space: Space, light: PhaseLight | SeasonalLight, inner: InnerGlass | None) -> str:
@@ -131,8 +134,8 @@ def _room_beyond(
     pairs: Sequence[tuple[Face, Face]],
     systems: Mapping[str, States],
     onward: InnerGlass | None,
-) -> tuple[DaylightScene, list[SystemOptics]]:
-    """The scene of a room beyond panes, and the optics of all glass that lights it."""
+) -> tuple[DaylightScene, list[SystemOptics], SpectralFactor]:
+    """The scene of a room beyond panes, the optics of all glass that lights it, and the colour of that light."""
     open_ = {back.name for _, back in pairs} | (set() if onward is None else onward.faces)
     opaque = [face for face in room.faces if face.name not in open_]
     glass = [
@@ -153,8 +156,15 @@ def _room_beyond(
         (*windows.groups, *(() if onward is None else onward.groups)),
         adjacent=() if onward is None else onward.beyond,
     )
-    optics = [*windows.optics(), *(() if onward is None else onward.optics)]
-    return scene, [states[0] for states in optics]
+    optics = [states[0] for states in (*windows.optics(), *(() if onward is None else onward.optics))]
+    spectra = [states[0].spectrum or SpectralFactor.neutral() for states in windows.systems]
+    spectra += () if onward is None else onward.spectra
+    # of diffuse light outdoors
+    amounts = [
+        group.area * float(KLEMS_FULL.projected_solid_angles() @ one.transmission.sum(axis=1))
+        for group, one in zip(scene.groups, optics, strict=True)
+    ]
+    return scene, optics, SpectralFactor.of_diffuse_light(spectra, amounts)
 
 
 def _piece(face: Face, name: str, triangles: NDArray[np.float64], reflectance: float) -> Element:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +23,7 @@ from scenes.fenestration.systems import States
 from scenes.results import ShadingYear
 from scenes.room.control_groups import ControlGroups, control_groups
 from scenes.room.luminaires import with_luminaires
-from scenes.room.operation import FUNCTION, Controller, OperationHours
+from scenes.room.operation import FUNCTION, Controller, OperationHours, SharedYear
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
 from scenes.room.windows import RoomWindows, room_windows
@@ -67,6 +67,13 @@ class RoomInputs:
     cache: MatrixCache | None
     together: frozenset[str] = frozenset()  # GUIDs of the rooms that are balanced with this one
     controller: Controller | None = None  # in place of the operation's rules of shading
+    shared: Mapping[str, SharedYear] = field(default_factory=dict)  # known states, by the name of their group
+
+    @property
+    def followed(self) -> dict[int, SharedYear]:
+        """The known years of control groups that other rooms share, by the number of the group."""
+        names = enumerate(self.control.shared)
+        return {c: self.shared[name].up_to(self.windows.states_of(c)) for c, name in names if name in self.shared}
 
     @property
     def other_sensors(self) -> int:
@@ -98,7 +105,7 @@ class RoomInputs:
         Args: moved_by, reasons: as of `ShadingYear`.
         """
         firsts = [int(np.argmax(self.windows.control == c)) for c in range(len(self.control.names))]
-        rules = tuple(rule.rule for rule in self.control.rules)
+        rules = self.control.kinds
         if self.controller is not None:
             rules = (FUNCTION,) * len(rules)
         seen = [[sight_through(one).is_view for one in self.windows.systems[g]] for g in firsts]
@@ -128,6 +135,7 @@ def room_inputs(
     inner_glass: bool = False,
     together: Collection[str] = (),
     controller: Controller | None = None,
+    shared: Mapping[str, SharedYear] | None = None,
 ) -> RoomInputs:
     """The inputs of one room.
 
@@ -139,6 +147,8 @@ def room_inputs(
         together: GUIDs of the rooms whose heat is balanced with this one's: sun passes the glass
             and open doorways between them.
         controller: of the shading states, in place of the rules of the tables.
+        shared: known states of the groups that several rooms share, see `shared_states`; a group of
+            which none are known follows its rule in this room.
 
     Raises: `ValueError` for a window without a system, `DataError` for a room that the tables name
         and the building does not contain.
@@ -149,7 +159,9 @@ def room_inputs(
     if tables is not None:
         grid = (tuple(grids) or (options.grid,))[0]
         tables = with_luminaires(tables, building, space, grid, seed=options.sampling.seed)
-    control = control_groups(space, None if tables is None else tables.control)
+    control = control_groups(space, None if tables is None else tables.control, building)
+    shared = dict(shared or {})
+    control = control.following(shared)
     return RoomInputs(
         building,
         space,
@@ -167,6 +179,7 @@ def room_inputs(
         cache,
         frozenset(together),
         controller,
+        shared,
     )
 
 

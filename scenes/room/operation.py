@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -291,6 +291,19 @@ FUNCTION = "function"  # the rule of windows that a `Controller` moves, in resul
 
 
 @dataclass(frozen=True, slots=True)
+class SharedYear:
+    """The states of a group of windows of several rooms in every hour, and what moved them."""
+
+    states: NDArray[np.int64]  # [H]
+    moved_by: NDArray[np.int64]  # [H] number of the reason of each move; -1: none
+    reasons: tuple[str, ...]
+
+    def up_to(self, count: int) -> SharedYear:
+        """The year of windows with `count` states."""
+        return replace(self, states=np.minimum(self.states, count - 1))
+
+
+@dataclass(frozen=True, slots=True)
 class Operation:
     """An operation file and its fenestration systems."""
 
@@ -298,6 +311,8 @@ class Operation:
     tables: OperationTables
     systems: tuple[FenestrationSystem, ...]  # states of every window; empty: the building file's
     controller: Controller | None = None  # of the shading states, in place of the file's rules
+    # known states of groups of several rooms, by name: of `shared_states`
+    shared: Mapping[str, SharedYear] = field(default_factory=dict)
 
     def controlled_by(self, controller: Controller) -> Operation:
         """The operation with a function of each hour in place of the file's rules of shading.

@@ -24,7 +24,7 @@ from scenes.room.schedules import (
     tables_within,
     unknown_name,
 )
-from scenes.room.shading_rules import ControlTable
+from scenes.room.shading_rules import ControlTable, GroupTable
 from scenes.room.surface_spectra import SurfaceTable
 from scenes.toml_file import Positive, Share, TomlTable
 from thermal.ground import SHIELDS, SOILS
@@ -453,6 +453,8 @@ class RoomsTable(TomlTable):
 
     spaces: tuple[str, ...] = ()  # names or GUIDs
     types: tuple[str, ...] = ()  # of the IFC's space types
+    storeys: tuple[str, ...] = ()
+    zones: tuple[str, ...] = ()  # IfcZone
     control: ControlTable = ControlTable()
     gains: GainsTable = GainsTable()
     air: AirTable = AirTable()
@@ -461,8 +463,8 @@ class RoomsTable(TomlTable):
 
     @model_validator(mode="after")
     def _names_some(self) -> RoomsTable:
-        if not self.spaces and not self.types:
-            raise ValueError("name `spaces` or `types`")
+        if not (self.spaces or self.types or self.storeys or self.zones):
+            raise ValueError("name `spaces`, `types`, `storeys` or `zones`")
         return self
 
 
@@ -495,6 +497,27 @@ class BandsTable(TomlTable):
     infiltration_percent: Deviation | None = None
     heating_set_c: Deviation | None = None
     cooling_set_c: Deviation | None = None
+
+
+def rooms_of(building: Building, table: RoomsTable | GroupTable, place: str) -> set[str]:
+    """GUIDs of the rooms that a table names by `spaces`, `storeys` and `zones`.
+
+    Raises: `DataError` for a name that the building does not have.
+    """
+    guids = {building.room(name).space.guid for name in table.spaces}
+    named = {
+        "storeys": (table.storeys, building.storey, {space.storey for space in building.spaces}),
+        "zones": (table.zones, building.zone, {zone.name for zone in building.zones}),
+    }
+    for key, (names, spaces_of, known) in named.items():
+        for name in names:
+            spaces = spaces_of(name)
+            if not spaces:
+                there = ", ".join(sorted(filter(None, known))) or "none"
+                message = f"no {key[:-1]} {name!r}; there are: {there}"
+                raise DataError(message, file=building.file, field=f"{place}.{key}")
+            guids |= {space.guid for space in spaces}
+    return guids
 
 
 class OperationTables(TomlTable):
@@ -584,6 +607,7 @@ class OperationTables(TomlTable):
                     message = f"no room has a window {name!r}; this one has: {there}"
                     field = f"control.group.{number}.windows"
                     raise DataError(message, file=building.file, field=field)
+            rooms_of(building, group, f"control.group.{number}")
         return tables
 
     def entry_of(self, building: Building, space: Space) -> RoomsTable | None:
@@ -593,7 +617,7 @@ class OperationTables(TomlTable):
         """
         chosen = None
         for number, rooms in reversed(tuple(enumerate(self.rooms))):
-            guids = {building.room(name).space.guid for name in rooms.spaces}
+            guids = rooms_of(building, rooms, f"rooms.{number}")
             kinds = {one.type_name for one in building.spaces}
             for name in rooms.types:
                 if name not in kinds:

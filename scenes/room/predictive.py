@@ -16,15 +16,16 @@ from mitsuba_cfs.progress import Progress, silent
 from scenes.room.control_year import ControlYear
 from scenes.room.operation import OperationHours
 from scenes.room.operation_tables import OperationTables
-from scenes.room.shading import Seat, view_taken
+from scenes.room.shading_by_light import Seat, view_taken
 from scenes.room.shading_rules import ShadingRule
-from scenes.room.zone import climate
+from scenes.room.zone import climate, lamp_daylight
 from thermal.predictive import Forecast, PredictedHours, PredictedYear, noisy_forecast, predicted_year
 from thermal.reduced import ReducedZone, reduced_zone
 
 FloatArray = NDArray[np.float64]
 LIMIT = 0.40  # DGP, the default of `limit_dgp`
 PENALTY = 1e7  # [Wh] for each unit of DGP above the limit: before any energy
+FIXED = 1e9  # [Wh] of a state other than that of a group which several rooms share: before any glare
 CLOSED = 0.1  # [Wh] of an hour with all groups closed: of equal plans the more open one
 # Least DGP by Ev: Wienold and Christoffersen 2006 without sources, less 5 % for the noise of Ev
 LEAST = 0.95 * 5.87e-5, 0.16
@@ -43,15 +44,13 @@ def predictive_states(year: ControlYear, *, progress: Progress = silent) -> NDAr
 
     Raises: `DataError` for weather in other steps than hours.
     """
-    tables, (rule, *_) = year.room.operation, year.room.control.rules
+    tables = year.room.operation
+    rule = next(one for one in year.room.control.rules if one.rule == "predictive")
     if tables is None:
         raise ValueError("predictive control needs the tables of an operation")
     if year.room.weather.step_h != 1.0:
         message = "plans are of hours: the weather has steps of "
         message += f"{60 * year.room.weather.step_h:g} minutes"
-        raise DataError(message, element=year.room.space.label, field="control.rule")
-    if tables.gains.lighting_zone:
-        message = "plans have one photosensor: [[gains.lighting_zone]] goes with the other rules"
         raise DataError(message, element=year.room.space.label, field="control.rule")
     planner = Planner(year, tables, rule)
     for ahead in (1, tables.control.predictive.horizon_h):
@@ -106,13 +105,16 @@ class Planner:
         if of_rated:
             penalty[self.used] += np.where(self.rated[self.used], 0.0, 2 * PENALTY)
         penalty[self.used] += table.view_wh * self._hidden
+        for c, shared in self._year.room.followed.items():
+            other = self._year.combinations[:, c] != shared.states[:, None]
+            penalty += np.where(other, FIXED, 0.0)
         most = np.maximum(np.array(self._year.counts) - 1, 1)
         penalty += CLOSED * (self._year.combinations / most).mean(axis=1)
         hours = PredictedHours(
             self._hours.sun,
             self._hours.daylight,
             self._hours.lamps,
-            self._hours.dimming,
+            self._hours.zones,
             self._hours.internal,
             penalty,
             self._year.counts,
@@ -149,7 +151,7 @@ def predicted_hours(year: ControlYear, tables: OperationTables) -> tuple[Reduced
     hours, zone = OperationHours(tables, room.weather), year.zone.zone
     windows = year.of_panes(year.combinations)
     sun, daylight = [], []
-    dimming = tables.gains.dimming
+    lamp_zones = tables.gains.zones
     areas = np.array([window.area for window in zone.windows])
     for states, chosen in zip(map(tuple, year.combinations.tolist()), windows, strict=True):
         solar, *_ = year.sun_by_states.of(year.of_windows(states).tolist())
@@ -159,7 +161,11 @@ def predicted_hours(year: ControlYear, tables: OperationTables) -> tuple[Reduced
         if solar.absorbed_middle is not None:
             absorbed = absorbed + solar.absorbed_middle * middle
         sun.append(solar.inside.sum(axis=1) + absorbed @ areas)
-        daylight.append(np.zeros(room.skies.hours) if dimming is None else year.work_plane_lx(states))
+        plane = np.zeros((len(lamp_zones), room.skies.hours))
+        if tables.gains.dims:
+            lit = room.skies.whole_year(year.sensors_lx(states)).T
+            plane = lamp_daylight(tables, year.light.scene.points[: lit.shape[1]], lit)
+        daylight.append(plane.T)
     reduced = reduced_zone(zone, climate(room.weather), solar.facade, windows, terrain=tables.terrain)
     area = room.space.floor_area
     lamps, other = hours.lamps(area), hours.heat(area) + tables.gains.lighting_standby_w_m2 * area
@@ -167,7 +173,7 @@ def predicted_hours(year: ControlYear, tables: OperationTables) -> tuple[Reduced
         np.stack(sun, axis=1),
         np.stack(daylight, axis=1),
         lamps,
-        dimming,
+        tuple((share, one.dimming) for share, one, _ in lamp_zones),
         np.broadcast_to(other, lamps.shape).copy(),
         np.zeros((1, 1)),
     )

@@ -41,7 +41,7 @@ from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.trace.kernels.scattering import through_beams
 from scenes.fenestration.systems import States
-from scenes.results import ExploredRoom, GlareResults, RoomYear
+from scenes.results import ExploredRoom, GlareResults, RoomYear, ShadingYear
 from scenes.room.control_hour import controlled_states
 from scenes.room.daylight import room_daylight
 from scenes.room.glare import annual_glare, coloured, rated_hours, rated_hours_error, rating_of, room_glare
@@ -56,7 +56,14 @@ from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.room.picture_hours import wanted_hours
 from scenes.room.sensitivities import heat_sensitivities, light_sensitivities
-from scenes.room.shading import control_signals, predicts, room_conditions, ruled_year, temperature_conditions
+from scenes.room.shading import (
+    RuledYear,
+    control_signals,
+    predicts,
+    room_conditions,
+    ruled_year,
+    temperature_conditions,
+)
 from scenes.room.solar import SeasonalOutdoors, seasonal_outdoors
 from scenes.room.spectral import explored_colour, room_spectral
 from scenes.room.zone import (
@@ -190,27 +197,16 @@ def lit_room(
         message = "the explorer knows one state of the trees: give them one transmittance"
         raise DataError(message, file=building.file, field="--explore")
     hours = wanted_hours(options.outputs.picture_hours, weather.midpoints, room.skies.lit)
-    outdoors = year = dgp = rated = explored = surfaces = choice = spectral = sensitivities = samples = None
+    year = dgp = rated = explored = spectral = sensitivities = samples = None
     dgp_error = 0.0
     times = StageTimes()
 
     with times.stage("daylight"):
         needs = light_needs(room, annual_glare=options.outputs.annual_glare)
         light = room_light(room, needs=needs, progress=progress)
-        conditions, ruled = temperature_conditions(room), None
-        has_function = room.controller is not None and bool(space.windows)
-        controlled = has_function or predicts(room)
-        if conditions or controlled or "irradiance" in control_signals(room):
-            outdoors = seasonal_outdoors(room, light, progress=progress)
-        if conditions and outdoors is not None:
-            surfaces = zone_surfaces(room)
-            choice = controlled_zone(room, surfaces, outdoors, light, progress=progress)
-            state = _states_by_balance(room, choice)
-        elif controlled and outdoors is not None:
-            state = controlled_states(room, light, outdoors, progress=progress)
-        else:
-            ruled = ruled_year(room, light, outdoors, progress=progress)
-            state = ruled.states[:, room.windows.control]
+        decided = decided_states(room, light, progress=progress)
+        state, ruled, choice = decided.state, decided.ruled, decided.choice
+        outdoors, surfaces = decided.outdoors, decided.surfaces
         daylight = room_daylight(room, light, state, progress=progress)
     with times.stage("leaks"):
         leaks = leak_issues(space, light.scene, seed=options.sampling.seed, cache=cache)
@@ -295,6 +291,7 @@ def inputs_of_room(
         inner_glass=inner,
         together=together,
         controller=None if operation is None else operation.controller,
+        shared=None if operation is None else operation.shared,
     )
 
 
@@ -343,12 +340,64 @@ def controlled_zone(
     return replace(rooms[0], alternatives=RoomAlternatives(conditions, read, tuple(rooms)))
 
 
-def _states_by_balance(room: RoomInputs, zone: RoomZone) -> NDArray[np.int64]:
-    """States [H, G] that the heat balance of the room alone chooses."""
+@dataclass(frozen=True, slots=True)
+class DecidedStates:
+    """The shading states of a room, and what was computed to decide on them."""
+
+    state: NDArray[np.int64]  # [H, G] of the window groups
+    ruled: RuledYear | None  # by rules that read nothing of the room's heat
+    outdoors: SeasonalOutdoors | None
+    surfaces: ZoneSurfaces | None
+    choice: RoomZone | None  # with the alternatives of rules by the room's temperature
+
+
+def decided_states(room: RoomInputs, light: RoomLight | None, *, progress: Progress = silent) -> DecidedStates:
+    """The states of a room's window groups by its function, plans or rules; light: None where these read none."""
+    conditions, outdoors = temperature_conditions(room), None
+    has_function = room.controller is not None and bool(room.space.windows)
+    controlled = has_function or predicts(room)
+    if conditions or controlled or "irradiance" in control_signals(room):
+        outdoors = seasonal_outdoors(room, light, progress=progress)
+    if conditions and outdoors is not None:
+        surfaces = zone_surfaces(room)
+        choice = controlled_zone(room, surfaces, outdoors, light, progress=progress)
+        chosen = _chosen_by_balance(room, choice).states[:, room.windows.control]
+        return DecidedStates(chosen, None, outdoors, surfaces, choice)
+    if controlled and outdoors is not None and light is not None:
+        state = controlled_states(room, light, outdoors, progress=progress)
+        return DecidedStates(state, None, outdoors, None, None)
+    ruled = ruled_year(room, light, outdoors, progress=progress)
+    return DecidedStates(ruled.states[:, room.windows.control], ruled, outdoors, None, None)
+
+
+def asked_year(room: RoomInputs, *, progress: Progress = silent) -> RuledYear:
+    """The states of its control groups that a room asks for by itself, and what moves them.
+
+    Its light is computed only as far as its rules read it.
+    """
+    signals, light = control_signals(room), None
+    planned = room.controller is not None or predicts(room)
+    if planned or signals - {"irradiance", "sun"} or (temperature_conditions(room) and reads_work_plane(room)):
+        light = room_light(room, needs=light_needs(room), progress=progress)
+    decided = decided_states(room, light, progress=progress)
+    if decided.ruled is not None:
+        return decided.ruled
+    if decided.choice is not None:
+        year = _chosen_by_balance(room, decided.choice)
+        moved = np.full_like(year.states, -1) if year.moved_by is None else year.moved_by
+        return RuledYear(year.states, moved, year.reasons)
+    year = room.shading(decided.state)
+    kinds = tuple(dict.fromkeys(year.rules))
+    numbers = np.array([kinds.index(kind) for kind in year.rules])
+    moves = np.concatenate([np.zeros_like(year.states[:1]), np.diff(year.states, axis=0)]) != 0
+    return RuledYear(year.states, np.where(moves, numbers, -1), kinds)
+
+
+def _chosen_by_balance(room: RoomInputs, zone: RoomZone) -> ShadingYear:
+    """The year of shading that the heat balance of the room alone chooses."""
     terrain = "suburbs" if room.operation is None else room.operation.terrain
     (result,) = balances([zone], room.weather, room.options.heat_step_s, terrain=terrain)
-    chosen = zone.in_alternatives(result.alternative).shading.states
-    return chosen[:, room.windows.control]
+    return zone.in_alternatives(result.alternative).shading
 
 
 LARGEST = 400  # pixels of a side of its pictures

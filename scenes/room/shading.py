@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.glare.evaluation import GlareOptions
-from mitsuba_cfs.images.view import View, fisheye
-from mitsuba_cfs.methods.glare import hourly_glare
-from mitsuba_cfs.methods.light import SeasonalLight, direct_sun_by_group, eye_illuminance, illuminance, with_view
-from mitsuba_cfs.methods.phase_light import PhaseLight
-from mitsuba_cfs.metrics.lm83 import blinds_operated
-from mitsuba_cfs.progress import Progress, part, silent
+from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import is_up, sun_directions
-from scenes.fenestration.sight import sight_through
 from scenes.fenestration.systems import FenestrationSystem
-from scenes.results import day_numbers
-from scenes.room.glare import rating_of
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
-from scenes.room.operation import OperationHours
+from scenes.room.operation import OperationHours, SharedYear
+from scenes.room.shading_by_light import days, states_by_people, take_jointly
 from scenes.room.shading_rules import (
     JOINT_RULES,
     LOAD_RULES,
@@ -43,7 +33,6 @@ from thermal.control import (
     WaitingRule,
     always,
     by_cut_off,
-    by_glare,
     by_threshold,
     combinations_of,
     delayed,
@@ -53,13 +42,10 @@ from thermal.control import (
     sun_depth,
     with_few_moves,
 )
-from thermal.occupants import arrivals, haldi_robinson_2010, lightswitch_2002
+from thermal.occupants import arrivals
 
 FloatArray = NDArray[np.float64]
 StateArray = NDArray[np.int64]
-MOST_COMBINATIONS = 1024  # of states of groups that avoid glare together
-# An eye: position [m] and azimuth of the line of sight [deg] from north by east, None of the view
-Seat = tuple[tuple[float, float, float] | None, float | None]
 
 
 def control_signals(room: RoomInputs) -> frozenset[str]:
@@ -91,7 +77,7 @@ def predicts(room: RoomInputs) -> bool:
     """Whether the shading of a room follows plans of the hours ahead."""
     if room.operation is None or room.controller is not None or not room.space.windows:
         return False
-    return room.control.rules[0].rule == "predictive"
+    return any(rule.rule == "predictive" for rule in room.control.rules)
 
 
 Levels = Mapping[Condition, int]  # of conditions: 1 met, 0 not; of a rule that waits its own
@@ -268,7 +254,9 @@ def ruled_year(
     if operation is None or not room.space.windows:
         return RuledYear(states, np.full_like(states, -1), ())
     signals, moved_by = _Signals(room, outdoors, met), np.full_like(states, -1)
-    reasons = tuple(dict.fromkeys(one for rule in rules for one in _reasons(rule)))
+    followed = room.followed
+    known_reasons = (one for year in followed.values() for one in year.reasons)
+    reasons = tuple(dict.fromkeys((*(one for rule in rules for one in _reasons(rule)), *known_reasons)))
 
     def reading(kinds: Sequence[str]) -> NDArray[np.int64]:
         found = [c for c, r in enumerate(rules) if any(leaf.rule in kinds for leaf in r.leaves)]
@@ -282,18 +270,27 @@ def ruled_year(
         raise ValueError("rules against glare, by daylight or by people need the room's light")
     by_people: dict[int, StateArray] = {}
     for c in range(len(rules)):
-        if c not in joint and c not in manual:
+        if c in followed:
+            states[:, c], moved_by[:, c] = followed[c].states, _renumbered(followed[c], reasons)
+        elif c not in joint and c not in manual:
             rule_of(c, {})
     if light is not None and len(manual):
-        by_people = _by_people(room, light, states, manual)
+        by_people = states_by_people(room, light, states, manual)
         for c in set(manual.tolist()) - set(joint.tolist()):
             rule_of(c, {"manual": by_people[c]})
     if light is not None and len(joint):
-        _take_jointly(room, light, states, joint, progress)
+        take_jointly(room, light, states, joint, progress)
         for c in joint.tolist():
             known = {kind: states[:, c].copy() for kind in JOINT_RULES}
             rule_of(c, known | ({"manual": by_people[c]} if c in by_people else {}))
     return RuledYear(states, moved_by, reasons)
+
+
+def _renumbered(year: SharedYear, reasons: Sequence[str]) -> StateArray:
+    """The number of the reason of each move [H] of a year, among `reasons`; -1: none."""
+    numbers = np.array([*map(reasons.index, year.reasons), -1], dtype=np.int64)
+    moved: StateArray = np.where(_moves(year.states), numbers[year.moved_by], -1)
+    return moved
 
 
 def _reasons(rule: ShadingRule) -> Iterator[str]:
@@ -329,7 +326,7 @@ def _by_rule(
     def plain(rule: ShadingRule, place: str) -> StateArray:
         if rule.rule in known:
             return known[rule.rule]
-        closed = rule.state or group_states(room, c) - 1
+        closed = rule.state or room.windows.states_of(c) - 1
         if rule.rule in ("schedule", *WEATHER_RULES) and operation is not None:
             of_hours = OperationHours(operation, room.weather)
             return of_hours.states(rule, place, room.windows.states, closed)
@@ -358,31 +355,39 @@ def _by_rule(
             return states, np.full(hours, -1)
         if rule.rule in ("any", "all"):
             parts = [of(*one) for one in _parts(rule, place)]
-            states, by = _combined(rule.rule == "any", parts)
+            states, by = combined_states(rule.rule == "any", parts)
         else:
             states = plain(rule, place)
             if rule.inverse:
-                states = np.where(states > 0, 0, rule.state or group_states(room, c) - 1)
+                states = np.where(states > 0, 0, rule.state or room.windows.states_of(c) - 1)
             by = np.where(_moves(states), reasons.index(rule.rule), -1)
-        if place == at_once:
-            return states, by
-        wait, hold = _waits(rule, room.weather.step_h)
-        few = rule.most_moves or 1
-        changes: dict[str, Callable[[StateArray], StateArray]] = {
-            "open_delay_h": lambda one: delayed(one, wait),
-            "hold_h": lambda one: held(one, hold),
-            "until": lambda one: latched(one, _ends(room, rule.until)),
-            "most_moves": lambda one: with_few_moves(one, few, days(room)),
-        }
-        for key in WAITS:
-            if getattr(rule, key):
-                waited = changes[key](states)
-                same = _moves(states) & (waited == states)
-                by = np.where(_moves(waited), np.where(same, by, reasons.index(key)), -1)
-                states = waited
-        return states, by
+        return (states, by) if place == at_once else waited_states(room, rule, states, by, reasons)
 
     return of(*(at or (room.control.rules[c], room.control.places[c])))
+
+
+def waited_states(
+    room: RoomInputs, rule: ShadingRule, states: StateArray, by: StateArray, reasons: Sequence[str]
+) -> tuple[StateArray, StateArray]:
+    """States that a rule asks for [H] as it waits, and the number of the reason of each move [H].
+
+    Args: by: the reasons of the moves that are asked for, as numbers of `reasons`.
+    """
+    wait, hold = _waits(rule, room.weather.step_h)
+    few = rule.most_moves or 1
+    changes: dict[str, Callable[[StateArray], StateArray]] = {
+        "open_delay_h": lambda one: delayed(one, wait),
+        "hold_h": lambda one: held(one, hold),
+        "until": lambda one: latched(one, _ends(room, rule.until)),
+        "most_moves": lambda one: with_few_moves(one, few, days(room)),
+    }
+    for key in WAITS:
+        if getattr(rule, key):
+            waited = changes[key](states)
+            same = _moves(states) & (waited == states)
+            by = np.where(_moves(waited), np.where(same, by, reasons.index(key)), -1)
+            states = waited
+    return states, by
 
 
 def _moves(states: StateArray) -> NDArray[np.bool_]:
@@ -390,7 +395,7 @@ def _moves(states: StateArray) -> NDArray[np.bool_]:
     return np.concatenate([[False], states[1:] != states[:-1]])
 
 
-def _combined(closed: bool, parts: Sequence[tuple[StateArray, StateArray]]) -> tuple[StateArray, StateArray]:
+def combined_states(closed: bool, parts: Sequence[tuple[StateArray, StateArray]]) -> tuple[StateArray, StateArray]:
     """The most closed, or most open, states of parts [H], and the reason of each move [H].
 
     The part that has the extreme after a move towards it, or before one away from it, moves then.
@@ -403,11 +408,6 @@ def _combined(closed: bool, parts: Sequence[tuple[StateArray, StateArray]]) -> t
     towards = change > 0 if closed else change < 0
     chosen = by[np.where(towards, number, before), np.arange(by.shape[1])]
     return extreme, np.where(change != 0, chosen, -1)
-
-
-def days(room: RoomInputs) -> NDArray[np.int64]:
-    """Number of the day of each hour [H], by the weather's local standard time."""
-    return day_numbers(room.weather.midpoints)
 
 
 def _ends(room: RoomInputs, until: str) -> NDArray[np.bool_]:
@@ -482,12 +482,6 @@ def slat_tilts_deg(states: Sequence[FenestrationSystem]) -> FloatArray:
     return np.array([np.nan if s.tilt_deg is None else s.tilt_deg for s in states], dtype=float)
 
 
-def group_states(room: RoomInputs, c: int) -> int:
-    """Number of states of a control group: of its window group with the most."""
-    windows = room.windows
-    return max(len(windows.systems[g]) for g in np.flatnonzero(windows.control == c))
-
-
 def _by_sun_depth(room: RoomInputs, rule: ShadingRule, groups: NDArray[np.int64], beam: FloatArray) -> StateArray:
     """1 where the sun reaches deeper into the room than a rule allows [H], else 0."""
     sun = sun_directions(room.weather)
@@ -499,264 +493,3 @@ def _by_sun_depth(room: RoomInputs, rule: ShadingRule, groups: NDArray[np.int64]
         depth = sun_depth(sun, group.frame[2], corners, floor + rule.plane_height_m)
         result |= (depth > rule.deepest_m) & (beam[:, g] > rule.beam_above)
     return result
-
-
-def _by_people(
-    room: RoomInputs, light: RoomLight, states: StateArray, manual: NDArray[np.int64]
-) -> dict[int, StateArray]:
-    """The states [H] of control groups that people move, by the number of the group.
-
-    Groups with the same rule are moved by the same people.
-
-    Args: states: [H, N] of the groups without such a rule; the others are open.
-    """
-    found: dict[int, StateArray] = {}
-    rules: dict[tuple[object, ...], list[int]] = {}
-    for c in manual.tolist():
-        leaf = next(one for one in room.control.rules[c].leaves if one.rule == "manual")
-        rules.setdefault((leaf.behaviour, leaf.seed, leaf.at), []).append(c)
-    for members in rules.values():
-        leaf = next(one for one in room.control.rules[members[0]].leaves if one.rule == "manual")
-        if leaf.behaviour == "Haldi-Robinson":
-            found |= _by_habit(room, light, states, members, leaf)
-        else:
-            found |= _by_direct_sun(room, light, members, leaf)
-    return found
-
-
-def _by_direct_sun(room: RoomInputs, light: RoomLight, members: list[int], rule: ShadingRule) -> dict[int, StateArray]:
-    """States [H] of control groups by LM-83's rule, or of Lightswitch-2002's active user."""
-    through = direct_sun_by_group(light.light)
-    if through is None:
-        message = f"{rule.behaviour} reads the direct sun, which the three-phase method lacks"
-        raise DataError(message, element=room.space.label, field="control.behaviour")
-    control, plane = room.windows.control, _plane_sensors(room, light)
-    direct = np.stack(
-        [np.sum([through[g][plane] for g in np.flatnonzero(control == c)], axis=0) for c in members]
-    )  # [n, S, L]
-    if rule.behaviour == "LM-83":
-        lit = blinds_operated(list(direct.transpose(0, 2, 1))).astype(np.int64)
-        closed = [room.skies.whole_year(one).astype(np.int64) for one in lit]
-        return {c: one * _closed(room, c) for c, one in zip(members, closed, strict=True)}
-    place = light.scene.eye.position if rule.at is None else rule.at
-    nearest = int(np.argmin(np.linalg.norm(light.scene.points[plane] - np.array(place), axis=1)))
-    sky, normal = room.skies, room.weather.direct_normal[room.skies.lit]
-    watts = np.where(sky.illuminance > 0, normal / np.maximum(sky.illuminance, 1e-9), 0.0)
-    present, day = _present(room), days(room)
-    return {
-        c: lightswitch_2002(sky.whole_year(of_group[nearest] * watts), present, day, closed=_closed(room, c))
-        for c, of_group in zip(members, direct, strict=True)
-    }
-
-
-def _by_habit(
-    room: RoomInputs, light: RoomLight, states: StateArray, members: list[int], rule: ShadingRule
-) -> dict[int, StateArray]:
-    """States [H] of control groups of which Haldi and Robinson's people lower a share.
-
-    Light of the groups is added: that of each is known in each of its states.
-    """
-    counts = [group_states(room, c) for c in members]
-
-    def indoors(of_groups: StateArray) -> FloatArray:
-        rows = light.states(of_groups[:, room.windows.control])
-        return room.skies.whole_year(_plane_lx(room, light, rows, rule.at))
-
-    base, more = indoors(states), []
-    for c, count in zip(members, counts, strict=True):
-        of_states = []
-        for state in range(count):
-            other = states.copy()
-            other[:, c] = state
-            of_states.append(indoors(other) - base)
-        more.append(np.stack(of_states))  # [J, H]
-
-    def lux(hour: int, shares: FloatArray) -> float:
-        parts = (
-            np.interp((1.0 - share) * (len(of) - 1), np.arange(len(of)), of[:, hour])
-            for share, of in zip(shares, more, strict=True)
-        )
-        return float(base[hour] + sum(parts))
-
-    level = facade_illuminance(room, "horizontal")[:, 0]
-    shares = haldi_robinson_2010(
-        lux,
-        level,
-        _present(room),
-        blinds=len(members),
-        seed=(rule.seed, zlib.crc32(room.space.guid.encode())),  # other people in each room
-        substeps=max(round(12 * room.weather.step_h), 1),
-    )
-    return {c: np.rint((1.0 - shares[:, n]) * (counts[n] - 1)).astype(np.int64) for n, c in enumerate(members)}
-
-
-def _closed(room: RoomInputs, c: int) -> int:
-    """The last state of a control group, or that which its rule by people names."""
-    leaf = next(one for one in room.control.rules[c].leaves if one.rule == "manual")
-    return leaf.state or group_states(room, c) - 1
-
-
-def _present(room: RoomInputs) -> FloatArray:
-    """Share of the people that is present [H]."""
-    if room.operation is None:
-        return room.occupied.astype(float)
-    return OperationHours(room.operation, room.weather).present
-
-
-def _plane_sensors(room: RoomInputs, light: RoomLight) -> slice:
-    return slice(0, len(light.scene.points) - room.other_sensors)
-
-
-def _plane_lx(
-    room: RoomInputs, light: RoomLight, rows: StateArray, at: tuple[float, float, float] | None
-) -> FloatArray:
-    """Daylight of the work plane in the lit hours [L] [lx]: the mean, or at the nearest sensor.
-
-    Args: rows: [G, L] states of the window groups.
-    """
-    plane = _plane_sensors(room, light)
-    values: FloatArray = illuminance(light.light, rows)[plane].astype(float)
-    if at is None:
-        return values.mean(axis=0)
-    return values[np.argmin(np.linalg.norm(light.scene.points[plane] - np.array(at), axis=1))]
-
-
-def _take_jointly(
-    room: RoomInputs, light: RoomLight, states: StateArray, joint: NDArray[np.int64], progress: Progress
-) -> None:
-    """Set the states [H, N] of control groups to the best combination for all rules of light.
-
-    The most open one whose glare at every seat, and whose daylight, are within their limits; for
-    rules that leave a target of daylight the most closed one that does.  All other
-    groups are in their states.
-    """
-    counts = [group_states(room, c) for c in joint]
-    combinations = np.array(list(product(*map(range, counts))), dtype=np.int64)
-    if len(combinations) > MOST_COMBINATIONS:
-        message = f"{len(joint)} groups have {len(combinations)} combinations of states, at most "
-        message += f"{MOST_COMBINATIONS} are rated: let more windows move together"
-        raise DataError(message, element=room.space.label, field="control.groups")
-    lit = room.skies.lit
-    leaves = [leaf for c in joint for leaf in room.control.rules[c].leaves]
-    closure = _closure(room, joint, combinations, leaves)
-    targets = [leaf for leaf in leaves if leaf.rule == "daylight"]
-    limits = _limits(room, light, [leaf for leaf in leaves if leaf.rule in JOINT_RULES])
-    if targets and len(targets) < len([leaf for leaf in leaves if leaf.rule in JOINT_RULES]):
-        message = 'the rule "daylight" closes as far as it can, others open: not in one room'
-        raise DataError(message, element=room.space.label, field="control.rule")
-    if targets:  # the most closed first, the most open where none leaves the target
-        combinations, closure = combinations[::-1], -closure[::-1]
-
-    def excess(number: int, hours: NDArray[np.int64]) -> FloatArray:
-        chosen = states.copy()
-        chosen[:, joint] = combinations[number]
-        rows = light.states(chosen[:, room.windows.control])
-        steps = part(progress, number / len(combinations), (number + 1) / len(combinations), "glare control")
-        return np.max([limit(rows, hours, steps) for limit in limits], axis=0)
-
-    chosen = by_glare(closure, excess, len(lit))
-    states[np.ix_(lit, joint)] = combinations[chosen]
-
-
-def _closure(
-    room: RoomInputs, joint: NDArray[np.int64], combinations: StateArray, leaves: Sequence[ShadingRule]
-) -> FloatArray:
-    """How closed each combination of states is [M], 0 to 1: the mean, weighted by glass area.
-
-    Of each group its number among its states, or the view through that it takes away.
-    """
-    if any(leaf.prefer == "view" for leaf in leaves):
-        return view_taken(room, joint, combinations) + 1e-3 * _mean_of_groups(room, joint, combinations)
-    return _mean_of_groups(room, joint, combinations)
-
-
-def view_taken(room: RoomInputs, groups: NDArray[np.int64], combinations: StateArray) -> FloatArray:
-    """Share of the view out that each combination of states of control groups takes away [M].
-
-    By the light of normal incidence that goes straight on, of that in the state with the most.
-    """
-    taken = []
-    for c in groups.tolist():
-        first = int(np.argmax(room.windows.control == c))
-        seen = np.array([sight_through(one).straight for one in room.windows.systems[first]])
-        taken.append(1.0 - seen / max(float(seen.max()), 1e-9))
-    return _mean_of_groups(room, groups, combinations, taken)
-
-
-def _mean_of_groups(
-    room: RoomInputs, groups: NDArray[np.int64], combinations: StateArray, values: Sequence[FloatArray] = ()
-) -> FloatArray:
-    """Mean over control groups, weighted by glass area, in each combination of states [M].
-
-    Args: values: [N][J] in each state; by default 0 for the first to 1 for the last.
-    """
-    windows, each, areas = room.windows, [], []
-    for n, c in enumerate(groups.tolist()):
-        count = group_states(room, c)
-        of_states = values[n] if len(values) else np.arange(count) / max(count - 1, 1)
-        each.append(of_states[np.minimum(combinations[:, n], len(of_states) - 1)])
-        areas.append(sum(windows.groups[g].area for g in np.flatnonzero(windows.control == c)))
-    mean: FloatArray = np.stack(each, axis=1) @ (np.array(areas) / np.sum(areas))
-    return mean
-
-
-Excess = Callable[[StateArray, NDArray[np.int64], Progress], FloatArray]
-
-
-def _limits(room: RoomInputs, light: RoomLight, rules: list[ShadingRule]) -> list[Excess]:
-    """For each seat and limit of rules: glare beyond it, relative to it, in some lit hours [h]."""
-    lights: dict[object, PhaseLight | SeasonalLight] = {}
-    limits: dict[object, Excess] = {}
-    for rule in rules:
-        if rule.rule in ("work plane", "daylight"):
-            level = rule.closes_above_lx if rule.rule == "work plane" else rule.target_lx
-            limits[rule.rule, rule.at, level] = _excess_daylight(room, light, rule, level)
-            continue
-        seat = rule.seat, rule.looks_deg
-        if seat not in lights:
-            view = None if seat == (None, None) else seat_view(room, seat, light.scene.eye)
-            lights[seat] = light.light if view is None else with_view(light.light, view)
-        limit = rule.limit_dgp
-        limits[seat, rule.limit_lx, limit] = (
-            _excess_illuminance(lights[seat], rule.limit_lx)
-            if limit is None
-            else _excess_dgp(lights[seat], limit, rating_of(room.options.outputs))
-        )
-    return list(limits.values())
-
-
-def _excess_daylight(room: RoomInputs, light: RoomLight, rule: ShadingRule, level: float) -> Excess:
-    """Daylight of the work plane above a level, or below it where it is a target."""
-    sign = 1.0 if rule.rule == "work plane" else -1.0
-
-    def excess(rows: StateArray, hours: NDArray[np.int64], progress: Progress) -> FloatArray:
-        values = _plane_lx(room, light, rows, rule.at)[hours].astype(np.float32)
-        return sign * (values.astype(float) - level) / level
-
-    return excess
-
-
-def _excess_illuminance(light: PhaseLight | SeasonalLight, limit: float) -> Excess:
-    def excess(rows: StateArray, hours: NDArray[np.int64], progress: Progress) -> FloatArray:
-        values = eye_illuminance(light, rows).astype(np.float32)[hours]
-        return (values.astype(float) - limit) / limit
-
-    return excess
-
-
-def _excess_dgp(light: PhaseLight | SeasonalLight, limit: float, rating: GlareOptions) -> Excess:
-    def excess(rows: StateArray, hours: NDArray[np.int64], progress: Progress) -> FloatArray:
-        rated = hourly_glare(light, "DGP", rows, hours=hours, options=rating, progress=progress)
-        return (rated.dgp - limit) / max(limit, 1e-9)
-
-    return excess
-
-
-def seat_view(room: RoomInputs, seat: Seat, view: View) -> View:
-    """The view of a seat; what it does not state is that of the room's view."""
-    (position, looks_deg), direction = seat, np.asarray(view.direction)
-    if looks_deg is not None:
-        angle = np.radians(looks_deg)
-        direction = np.array([np.sin(angle), np.cos(angle), 0.0])
-    position = view.position if position is None else position
-    return fisheye(position, direction, room.options.outputs.picture_size)

@@ -297,17 +297,28 @@ class PredictiveTable(TomlTable):
     view_wh: Annotated[float, Field(ge=0, le=1e4)] = 0.0
 
 
+Across = Literal["room", "storey", "zone", "building"]
+
+
 class GroupTable(ShadingRule):
     """Windows that move together by a rule; keys that it lacks are those of `control`."""
 
     name: str = ""  # in results; default: its first window or facade
     windows: tuple[str, ...] = ()  # names or GUIDs
+    # or the windows of these facades, in the rooms of these storeys, zones (IfcZone) and spaces; of all without
     facades: tuple[Facade, ...] = ()
+    storeys: tuple[str, ...] = ()
+    zones: tuple[str, ...] = ()
+    spaces: tuple[str, ...] = ()  # names or GUIDs
+    across: Across | None = None  # None: those of `control`
+    sensor_rooms: tuple[str, ...] = ()
 
     @model_validator(mode="after")
     def _names_some(self) -> GroupTable:
-        if not self.windows and not self.facades:
-            raise ValueError("name `windows` or `facades`")
+        if not (self.windows or self.facades or self.storeys or self.zones or self.spaces):
+            raise ValueError("name `windows`, `facades`, `storeys`, `zones` or `spaces`")
+        if self.across not in (None, "room") and self.windows and not self.name:
+            raise ValueError("name: windows of several rooms need one")
         return self
 
 
@@ -317,8 +328,36 @@ class ControlTable(ShadingRule):
     # windows that no entry of `group` names move together by facade (orientation), one by one, or
     # all of a room
     groups: Literal["facade", "window", "room"] = "facade"
+    # windows of which rooms move together: of one room, or of all rooms of a storey, a zone (IfcZone), the building
+    across: Across = "room"
+    # rooms whose sensors, seats, temperature and people the rule reads: names or GUIDs; all rooms of the group without
+    sensor_rooms: tuple[str, ...] = ()
     group: tuple[GroupTable, ...] = ()  # the first entry that names a window applies to it
     predictive: PredictiveTable = PredictiveTable()  # of the rule "predictive"
+
+    @model_validator(mode="after")
+    def _spans_rooms(self) -> ControlTable:
+        if self.groups == "window" and self.across != "room":
+            raise ValueError('across: with `groups = "window"` each window moves alone')
+        if self.sensor_rooms and not self.shares:
+            raise ValueError("sensor_rooms: the windows of each room move by themselves: state `across`")
+        for number, one in enumerate(self.group):
+            if one.sensor_rooms and self.across_of(one) == "room":
+                raise ValueError(f"group.{number}.sensor_rooms: the windows of each room move alone: state `across`")
+        return self
+
+    @property
+    def shares(self) -> bool:
+        """Whether windows of several rooms move together."""
+        return any(self.across_of(one) != "room" for one in (None, *self.group))
+
+    def across_of(self, group: GroupTable | None) -> Across:
+        """Of which rooms the windows of an entry of `group` move together; None: those that no entry names."""
+        return self.across if group is None or group.across is None else group.across
+
+    def sensor_rooms_of(self, group: GroupTable | None) -> tuple[str, ...]:
+        """The rooms that the rule of an entry of `group` reads; none: all whose windows it moves."""
+        return self.sensor_rooms if group is None or not group.sensor_rooms else group.sensor_rooms
 
     @model_validator(mode="after")
     def _predicts_all(self) -> ControlTable:

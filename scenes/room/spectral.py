@@ -9,12 +9,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from bim.colours import GREY
 from bim.rays import ray_mesh
 from mitsuba_cfs.bsdf.spectral_factor import ANGLES, SpectralFactor
 from mitsuba_cfs.images.hdr import LUMINANCE_WEIGHTS
 from mitsuba_cfs.images.view import pixel_directions
 from mitsuba_cfs.methods.colour_view import rgb_over_luminance
-from mitsuba_cfs.methods.optics import SystemOptics
 from mitsuba_cfs.methods.spectral_light import Detection, SpectralLight, sky_spectra, spectral_light
 from mitsuba_cfs.notes import Note
 from mitsuba_cfs.picture_year.year import PictureYear
@@ -110,7 +110,21 @@ def _light(
         ground=ground_reflectance(tables),
         progress=progress,
     )
-    return spectral, [*notes, *of_surfaces]
+    return spectral, [*notes, *of_surfaces, *_outdoors(room)]
+
+
+def _outdoors(room: RoomInputs) -> list[Note]:
+    """That the colours of surfaces outdoors are not used, where there are any."""
+    count = sum(element.hue != GREY for element in room.building.elements)
+    if not count:
+        return []
+    return [
+        Note(
+            "Room {room}: surfaces outdoors with a colour in the model ({count}) reflect all wavelengths equally.",
+            room=room.space.label,
+            count=count,
+        )
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,10 +289,15 @@ def _factors(room: RoomInputs, light: RoomLight) -> tuple[list[list[SpectralFact
                     )
                 )
     factors = [[known[id(system)] for system in states] for states in room.windows.systems]
-    inner: Sequence[Sequence[SystemOptics]] = light.light.systems[len(factors) :]
-    if inner:
-        notes.append(Note("Glass between rooms transmits all wavelengths equally."))
-    factors += [[SpectralFactor.neutral() for _ in states] for states in inner]
+    if light.inner is not None:
+        notes.append(
+            Note(
+                "Room {room}: daylight through glass between rooms has the colour of the other room's windows; that "
+                "glass and the surfaces of the other room count as neutral.",
+                room=room.space.label,
+            )
+        )
+        factors += [[one] for one in light.inner.spectra]
     return factors, notes
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from bim.ifc.control import StoredGroup, read_control
 from bim.model import Building
 from mitsuba_cfs.errors import DataError
-from scenes.room.control_groups import control_groups
+from scenes.room.control_groups import control_groups, shared_groups
 from scenes.room.operation_tables import OperationTables
 from scenes.room.shading_rules import ControlTable, stated_keys
 from scenes.toml_file import validated
@@ -18,20 +19,32 @@ def stored_groups(building: Building, tables: OperationTables, file: Path) -> li
 
     Raises: `DataError` for a rule by a schedule that the file has by name, as IFC has none of it.
     """
-    groups = []
+    groups: list[StoredGroup] = []
+    shared: dict[str, int] = {}
+    of_building = {group.name: group for group in shared_groups(building, tables)}
     for space in building.spaces:
         of_room = tables.of_room(building, space)
-        control = control_groups(space, of_room.control)
+        control = control_groups(space, of_room.control, building)
         for c, (name, rule) in enumerate(zip(control.names, control.rules, strict=True)):
+            windows = tuple(w.guid for w, n in zip(space.windows, control.number, strict=True) if n == c)
+            of_several = control.shared[c]
+            if of_several in shared:
+                known = groups[shared[of_several]]
+                groups[shared[of_several]] = replace(known, windows=(*known.windows, *windows))
+                continue
             for leaf in rule.leaves:
                 if isinstance(leaf.schedule, str):
                     message = f"{leaf.schedule!r}: an IFC file holds 24 states, no named schedule"
                     raise DataError(message, file=file, field=f"{control.places[c]}.schedule")
-            windows = [w.guid for w, n in zip(space.windows, control.number, strict=True) if n == c]
             stated = stated_keys(rule)
             if rule.rule == "predictive":
                 stated["predictive"] = of_room.control.predictive.model_dump(mode="json")
-            groups.append(StoredGroup(name, tuple(windows), stated, space.label))
+            if of_several:
+                shared[of_several] = len(groups)
+                stated["across"] = "building"
+                rooms = [room.guid for room in of_building[of_several].sensor_rooms]
+                stated |= {"sensor_rooms": rooms} if len(rooms) < len(of_building[of_several].windows) else {}
+            groups.append(StoredGroup(of_several or name, windows, stated, "" if of_several else space.label))
     return groups
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fnmatch import fnmatch
+from functools import cache
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
@@ -29,13 +31,16 @@ class SurfaceTable(TomlTable):
     select: Annotated[str, Field(min_length=1)]  # kind of a face, or its name, with * and ?; or `GROUND`
     spectrum: Path | None = None  # CSV file of `REFLECTANCE_COLUMNS`; its shape counts
     colour: str | None = None  # "#rrggbb", sRGB
+    material: str | None = None  # one of `materials`
 
     @model_validator(mode="after")
     def _has_one(self) -> SurfaceTable:
-        if (self.spectrum is None) == (self.colour is None):
-            raise ValueError("expected spectrum or colour")
+        if [self.spectrum, self.colour, self.material].count(None) != 2:
+            raise ValueError("expected spectrum, colour or material")
         if self.colour is not None:
             reflectance_of_code(self.colour)
+        if self.material is not None and self.material not in materials():
+            raise ValueError(f"material: expected one of {', '.join(materials())}, got {self.material!r}")
         return self
 
     def selects(self, part: Face | Element) -> bool:
@@ -48,7 +53,21 @@ class SurfaceTable(TomlTable):
         """Reflectance [N] of any scale; `DataError` for a file that cannot be read."""
         if self.spectrum is not None:
             return read_reflectance(self.spectrum)
+        if self.material is not None:
+            return materials()[self.material]
         return reflectance_of_code(str(self.colour))
+
+
+@cache
+def materials() -> dict[str, FloatArray]:
+    """Reflectances [N] of materials outdoors; that at 400 nm is taken below.
+
+    Source: means of the spectra of earthlib 1.1.0 (MIT licence, Christopher Anderson): for soil
+    those of ICRAF-ISRIC (4168 of 4185), else measured in Santa Barbara (Herold, Roberts, Gardner,
+    Dennison 2004, Remote Sensing of Environment 91, 304-319); vegetation is modelled (PROSAIL).
+    """
+    table = pd.read_csv(Path(__file__).with_suffix(".csv"), index_col=0)
+    return {str(name): np.interp(NANOMETRES, table.index, table[name]) for name in table}
 
 
 def ground_reflectance(tables: Sequence[SurfaceTable]) -> FloatArray | None:

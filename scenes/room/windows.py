@@ -39,6 +39,10 @@ class RoomWindows:
         """Number of shading states J: of the group with the most; 1 for a room without windows."""
         return max((len(states) for states in self.systems), default=1)
 
+    def states_of(self, c: int) -> int:
+        """Number of states of a control group: of its window group with the most."""
+        return max(len(self.systems[g]) for g in np.flatnonzero(self.control == c))
+
     def optics(self) -> list[list[BsdfOptics]]:
         """Optics of each group's systems by state [G][J]."""
         from mitsuba_cfs.methods.optics import (  # a tracer, which no export needs

@@ -33,9 +33,22 @@ def read_files(options: JobOptions) -> input_files.InputFiles:
     hours = options.room.outputs.picture_hours
     check_hours(hours)
     files = input_files.read_files(options)
+    if options.energyplus:
+        _check_energyplus(options, files)
     check_hours(hours, files.weather.midpoints)
     _check_sun(hours, files.weather)
     return files
+
+
+def _check_energyplus(options: JobOptions, files: input_files.InputFiles) -> None:
+    """Raise `DataError` for a run of which EnergyPlus cannot be given the rooms."""
+    if not options.coupled_heat:
+        raise DataError("writes rooms with heat between them: leave out --no-coupled-heat", field="--energyplus")
+    if files.operation is not None and files.operation.tables.heat_island is not None:
+        message = "EnergyPlus reads the EPW file itself, without a heat island"
+        raise DataError(message, file=files.operation.file, field="heat_island")
+    if files.weather.step_h != 1.0:
+        raise DataError("EnergyPlus takes a year of hours", file=options.weather, field="--energyplus")
 
 
 def _check_sun(hours: tuple[str, ...], weather: Weather) -> None:

@@ -14,6 +14,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from html import escape
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -25,13 +26,11 @@ from mitsuba_cfs.files import without_formulas
 from mitsuba_cfs.glare.classes import LIMITS
 from mitsuba_cfs.glare.indices import simplified_dgp
 from mitsuba_cfs.methods.light import eye_illuminance
-from mitsuba_cfs.methods.optics import SystemOptics
+from mitsuba_cfs.methods.optics import MatrixOptics
 from mitsuba_cfs.methods.phase_light import PhaseLight, illuminance_of_all, phase_light
 from mitsuba_cfs.methods.phase_matrices import PhaseMatrices, phase_matrices
 from mitsuba_cfs.methods.standard_error import noise_of_sums
 from mitsuba_cfs.progress import Progress, silent
-from mitsuba_cfs.trace.kernels.scattering import Scattering
-from mitsuba_cfs.trace.paths.scene import PathOptics
 from scenes.inputs import Inputs
 from scenes.language.catalogue import gettext
 from scenes.report.names import quantity
@@ -108,40 +107,15 @@ def first_plan(
     return planned
 
 
-@dataclass(frozen=True, slots=True)
-class _Transmitting:
-    """Optics of a system that reflects nothing outdoors."""
-
-    optics: SystemOptics
-    outdoor_reflection: None = None
-
-    @property
-    def reflection(self) -> NDArray[np.float64] | None:
-        """Reflection of the room's light."""
-        return self.optics.reflection
-
-    @property
-    def transmission(self) -> NDArray[np.float64]:
-        """T [K, K]."""
-        return self.optics.transmission
-
-    @property
-    def scattering(self) -> Scattering:
-        """Transmission of the sun's disc."""
-        return self.optics.scattering
-
-    @property
-    def paths(self) -> PathOptics:
-        """For path tracing."""
-        return self.optics.paths
-
-
 def _planned(room: RoomInputs, matrices: PhaseMatrices) -> PlannedRoom:
-    optics = [[_Transmitting(one) for one in states] for states in room.windows.optics()]
+    optics: list[list[Any]] = [  # that reflect nothing outdoors
+        [MatrixOptics(one.transmission, one.scattering, reflection=one.reflection) for one in states]
+        for states in room.windows.optics()
+    ]
     light = phase_light(matrices, optics, room.skies)
     of_room = RoomLight(matrices.scene, matrices, light, None)
     by_light = bool(control_signals(room) - READ) or room.controller is not None
-    unshaded = by_light or predicts(room) or bool(temperature_conditions(room))
+    unshaded = by_light or predicts(room) or bool(temperature_conditions(room)) or any(room.control.shared)
     state = np.zeros((room.skies.hours, len(room.windows.groups)), dtype=np.int64)
     if not unshaded:
         state = shading_states(room, of_room, None)

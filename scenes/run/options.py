@@ -22,6 +22,7 @@ class JobOptions(InputOptions):
     colour: bool = True  # each room's brightest picture in colour too
     explore: bool = False  # every hour's picture in every shading state, for the explorer
     error: float | None = None  # relative, of yearly means: fewer rays where it needs fewer
+    energyplus: bool = False  # the rooms as an EnergyPlus model besides
     netcdf: bool = False  # all numbers of the run as one netCDF file besides
 
     @property

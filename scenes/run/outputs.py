@@ -19,7 +19,7 @@ from bim.report.issue import COLUMNS, issue_rows
 from mitsuba_cfs.files import check_finite, json_text, without_formulas, write_table, write_text
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.progress import Progress, silent
-from scenes.language.catalogue import current_language, in_language
+from scenes.language.catalogue import current_language, gettext, in_language
 from scenes.language.numbers import rounded, spoken
 from scenes.pictures import write_falsecolour, write_tone_mapped
 from scenes.result_folder import EXPLORER, FIRST_PLAN, REPORT, ResultFolder
@@ -68,6 +68,8 @@ def write_results(
             write_text(temporary / FIRST_PLAN, first_plan)
         if netcdf:
             write_netcdf(result, temporary / NETCDF)
+        if result.twin is not None:
+            result.twin.write(temporary)
         for write, page in ((write_report, REPORT), (write_explorer, EXPLORER)):
             if write is not None:
                 faults += _faults(write, result, temporary / page)
@@ -174,7 +176,7 @@ def _write_room(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
     if (colour := room.glare.colour) is not None:
         name = f"view_{times[colour.hour]:%m-%d_%Hh}_colour"
         write_hdr(place / f"{name}.hdr", colour.radiance, room.glare.view)
-        title = spoken(times[colour.hour])
+        title = f"{spoken(times[colour.hour])}; {gettext('white balance: daylight outdoors')}"
         write_tone_mapped(place / f"{name}.png", colour.radiance, scale=True, title=title)
 
 

@@ -6,7 +6,7 @@ import platform
 import time
 import weakref
 from collections import Counter
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache, partial
@@ -14,7 +14,11 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bim.doorways import panes_between, source_rooms
+from bim.energyplus_twin import EnergyPlusTwin, TwinAir
 from bim.model import Space
 from bim.report.issue import Issue, issue_note
 from bim.sensors import model_grids
@@ -36,11 +40,16 @@ from scenes.inputs import Inputs, read_inputs
 from scenes.language.catalogue import N_
 from scenes.quick import NOTE
 from scenes.results import RoomYear, RunResult, method_figures, method_notes
-from scenes.room.heat import DaylitRoom, coupled_years
+from scenes.room.control_groups import same_control
+from scenes.room.energyplus import twin_of_rooms
+from scenes.room.heat import DaylitRoom, OnZones, coupled_years
 from scenes.room.inputs import skies_for
+from scenes.room.operation import SharedYear
 from scenes.room.operation_tables import OperationTables
 from scenes.room.room import RoomChoices, compute_room, lit_room
 from scenes.room.series import RoomSeries, moved_light, moved_result
+from scenes.room.shared_states import with_shared_states
+from scenes.room.zone import RoomZone
 from scenes.run.first_plan import FROM, OnPlan, first_plan, options_for_error
 from scenes.run.options import JobOptions
 from scenes.run.together import RoomsTogether
@@ -66,6 +75,7 @@ def computed_rooms(
     *,
     on_room: OnRoom | None = None,
     on_light: OnLight | None = None,
+    on_zones: OnZones | None = None,
     workers: Workers | None = None,
 ) -> tuple[Sequence[RoomYear], list[Issue], list[str]]:
     """The years of the rooms in their order, issues of rooms left out, notes.
@@ -74,6 +84,21 @@ def computed_rooms(
     """
     coupled = balanced_together(inputs, options)
     spaces = run_spaces(inputs, options)
+    inputs = replace(
+        inputs,
+        operation=with_shared_states(
+            inputs.operation,
+            inputs.building,
+            spaces,
+            inputs.systems,
+            inputs.weather,
+            options.room,
+            skies=skies,
+            cache=MatrixCache.of_user() if options.cache else None,
+            inner=options.inner_glass,
+            progress=progress,
+        ),
+    )
     store = StoredArrays() if len(spaces) > 1 else None
     with scratch_folder() as folder:
         equal = template_rooms(spaces)
@@ -109,6 +134,7 @@ def computed_rooms(
             progress,
             store=store,
             seed=options.room.sampling.seed,
+            on_zones=on_zones,
         )
         variants.return_memory()
         notes += coupling if len(years) > 1 else []
@@ -119,8 +145,8 @@ def computed_rooms(
 
 
 def balanced_together(inputs: Inputs, options: JobOptions) -> bool:
-    """Whether heat flows between the rooms of a run."""
-    return options.coupled_heat and len(inputs.spaces) > 1
+    """Whether the heat of a run's rooms is balanced after the light of all: it flows between them."""
+    return options.coupled_heat and (len(inputs.spaces) > 1 or options.energyplus)
 
 
 def run_spaces(inputs: Inputs, options: JobOptions) -> Sequence[Space]:
@@ -138,12 +164,8 @@ def _interchangeable(inputs: Inputs, options: JobOptions, one: Space, other: Spa
         return False  # their light depends on their neighbours
     if any(model_grids(building, room) for room in rooms):
         return False
-    if operation is not None:
-        tables = [operation.tables.of_room(building, room) for room in rooms]
-        if tables[0] != tables[1] or any(group.windows for group in tables[0].control.group):
-            return False  # other values, or a rule for windows of one of them
-        if tables[0].control.is_random:
-            return False  # other people
+    if not same_control(None if operation is None else operation.tables, building, one, other):
+        return False
     if options.colour and not same_hues(one, other):
         return False
     if not balanced_together(inputs, options):
@@ -207,7 +229,7 @@ class RoomWork:
         here = workers.scheduler is None
         run = "" if here else _identity(self.options, self.inputs)
         together = self.together.for_processes()
-        compute = _Here(replace(self, together=together)) if here else _FromFiles(self.with_heat, self.options, run)
+        compute = _Here(replace(self, together=together)) if here else self._from_files(run)
         left = Counter(together.set_of(guid) for guid in rooms)
         tasks = Tasks(
             list(rooms),
@@ -224,6 +246,10 @@ class RoomWork:
                 left[number] -= 1
                 if not left[number]:
                     together.remove(number)
+
+    def _from_files(self, run: str) -> _FromFiles:
+        operation = self.inputs.operation
+        return _FromFiles(self.with_heat, self.options, run, {} if operation is None else operation.shared)
 
     def of(self, guid: str) -> RoomYear | DaylitRoom:
         """The result of the room with a GUID."""
@@ -251,10 +277,13 @@ class _FromFiles:
     with_heat: bool
     options: JobOptions
     run: str  # `_identity` of the run
+    shared: Mapping[str, SharedYear]  # states of groups of several rooms
 
     def __call__(self, guid: str) -> tuple[str, RoomYear | DaylitRoom]:
         variants.activate()
         inputs, together, spaces, skies = _read(self.options, self.run)
+        if inputs.operation is not None:
+            inputs = replace(inputs, operation=replace(inputs.operation, shared=self.shared))
         work = RoomWork(inputs, spaces, skies, self.options, together, with_heat=self.with_heat)
         return guid, work.of(guid)
 
@@ -356,8 +385,23 @@ def run_inputs(
     room = options.room
     skies = skies_for(weather, room.sampling, **room.sky)
     progress("sky", 1.0)
+    twins: list[EnergyPlusTwin] = []
+
+    def twin(zones: Sequence[RoomZone], links: NDArray[np.float64]) -> None:
+        terrain = (OperationTables() if inputs.operation is None else inputs.operation.tables).terrain
+        of = inputs.building, zones, inputs.systems, weather
+        steps = round(3600.0 / room.heat_step_s)
+        twins.append(twin_of_rooms(*of, air=TwinAir(links), terrain=terrain, steps=steps))
+
     results, issues, notes = computed_rooms(
-        inputs, skies, options, progress, on_room=on_room, on_light=on_light, workers=workers
+        inputs,
+        skies,
+        options,
+        progress,
+        on_room=on_room,
+        on_light=on_light,
+        on_zones=twin if options.energyplus else None,
+        workers=workers,
     )
     if not results:
         raise DataError("none of its rooms could be computed", file=options.building)
@@ -371,17 +415,19 @@ def run_inputs(
         *method_notes(map(method_figures, results)),
         *(result.borrowed for result in results if result.borrowed),
         *map(issue_note, leaks),
+        *(f"model.epJSON: {note}." for one in twins for note in one.notes),
     ]
     return RunResult(
         building,
         weather.midpoints,
         sun,
         results,
-        (*building.issues, *issues, *leaks),
+        (*head.issues, *issues, *leaks),
         manifest,
         tuple(dict.fromkeys(notes)),
         room.method,
         head,
+        twins[0] if twins else None,
     )
 
 

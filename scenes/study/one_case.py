@@ -40,6 +40,7 @@ from scenes.results import RoomYear, method_figures
 from scenes.room.inputs import skies_for
 from scenes.room.options import RoomOptions
 from scenes.room.room import RoomChoices, compute_room
+from scenes.room.shared_states import with_shared_states
 from scenes.study.plan import OF_BUILDING, OF_ROOM, Case, InputFile, StudyPlan, program_version
 from scenes.study.store import CaseResult
 from scenes.study.study_file import SYSTEM_TABLE
@@ -92,15 +93,19 @@ def case_year(inputs: Inputs, case: Case, **chosen: Unpack[RoomChoices]) -> Room
     options, (space,) = case.options, inputs.spaces
     weather = _file(case, "weather"), case.orientation_deg
     skies = _skies(*weather, options.sampling, *options.sky.items())
+    room, cache = (inputs.building, [space], inputs.systems, inputs.weather, options), MatrixCache.of_user()
+    operation = with_shared_states(
+        inputs.operation, *room, skies=skies, cache=cache, progress=chosen.get("progress", silent)
+    )
     return compute_room(
         inputs.building,
         space,
         inputs.systems,
         inputs.weather,
         options,
-        operation=inputs.operation,
+        operation=operation,
         skies=skies,
-        cache=MatrixCache.of_user(),
+        cache=cache,
         pictures=False,
         **chosen,
     )

@@ -57,7 +57,7 @@ def genbsdf(samples: int, options: tuple[str, ...], *, levels: int = 0) -> Bsdf:
     from pyradiance import genbsdf as program
 
     os.environ.update(radiance.environment())
-    from mitsuba_cfs.bsdf.periodic import write_radiance
+    from tests.bsdf.radiance_cells import write_radiance
 
     layer, bottom = blind(WIDTH), (SLATS // 2) * SPACING
     cell = program.SamplingBox(-WIDTH / 2 - 0.04, -WIDTH / 2 + 0.04, bottom, bottom + SPACING, -layer.thickness, 0)

@@ -33,7 +33,7 @@ PARTS = {
     "V of pixels": ["mitsuba_cfs.methods.phase_matrices._view"],
     "windows that reflect": ["mitsuba_cfs.methods.phase_matrices.with_exchange"],
     "straight view": ["mitsuba_cfs.methods.coefficients.group_coefficients"],
-    "direct sun": ["mitsuba_cfs.methods.phase_light._direct_sun"],
+    "direct sun": ["mitsuba_cfs.methods.phase_light.direct_sun"],
     "reflected sun": [
         "mitsuba_cfs.methods.reflected_sun.reflected_sun",
         "mitsuba_cfs.methods.reflected_sun.reflected_to_sensors",

@@ -6,9 +6,9 @@ import pytest
 
 from bim.ifc.building import read_ifc
 from bim.shell import open_edges
-from scenes.demo.make_office import HEIGHT
 from tests.benchmarks import tower as benchmark
 from tests.benchmarks.tower import NORTH, ROOMS, SOUTH, tower
+from tests.demo.make_office import HEIGHT
 from tests.scripts import run_script
 
 

@@ -32,7 +32,7 @@ import ifcopenshell.api.root
 import numpy as np
 
 from scenes.demo import VENETIAN_BLIND, WEATHER
-from scenes.demo.make_office import HEIGHT, Office, project, thickness
+from tests.demo.make_office import HEIGHT, Office, project, thickness
 
 SOUTH, NORTH = 5, 4  # offices of a storey
 ROOMS = SOUTH + NORTH + 1

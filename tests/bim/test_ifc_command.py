@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import json
+import math
+
+import ifcopenshell
 import ifcopenshell.api.group
 import ifcopenshell.api.root
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from bim.ifc.north import true_north
+from bim.ifc.project import site_location
 from mitsuba_cfs.errors import DataError
 from scenes.commands.ifc import command
+from scenes.demo import OFFICE
 from tests.bim.small_ifc import DEPTH, HEIGHT, WALL, WIDTH, box_model, box_room
 
 
@@ -116,3 +123,19 @@ def test_survey_has_a_line_for_each_file(path, tmp_path):
     assert (cells["windows"], cells["glass m2"], cells["open"]) == ("1", "3.6", "0")
     assert float(cells["memory MB"]) > 50 and "refused: not an IFC file" in refused
     assert "2 files, 1 refused; 1 rooms" in sums
+
+
+def test_info_states_what_the_file_states_of_itself(tmp_path):
+    path = tmp_path / "turned.ifc"
+    model = ifcopenshell.open(str(OFFICE))
+    (context, *_) = model.by_type("IfcGeometricRepresentationContext", include_subtypes=False)
+    context.TrueNorth = model.createIfcDirection((math.sin(math.radians(30)), math.cos(math.radians(30))))
+    model.write(str(path))
+    words = ["info", str(path), "--json", str(tmp_path / "info.json")]
+    result = CliRunner().invoke(command, words, catch_exceptions=False)
+    assert "north: +y points 30.0 degrees west of north" in result.output
+    (found,) = json.loads((tmp_path / "info.json").read_text())
+    assert found["counts"]["spaces"] == len(model.by_type("IfcSpace")) == sum(found["storeys"].values())
+    assert found["counts"]["windows"] == len(model.by_type("IfcWindow"))
+    assert found["latitude_deg"] == pytest.approx(site_location(model)[0])
+    assert true_north(model)[0] == pytest.approx((0.5, math.sqrt(0.75)))

@@ -13,12 +13,13 @@ from bim.radiance.cell import read_radiance_layer
 from mitsuba_cfs.bsdf.blinds import venetian_blind
 from mitsuba_cfs.bsdf.generate import generate_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_QUARTER, KlemsBsdf
-from mitsuba_cfs.bsdf.periodic import plastic, write_radiance
+from mitsuba_cfs.bsdf.periodic import plastic
 from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.spectra.detectors import NANOMETRES, visible_mean
 from scenes.commands.bsdf import command
 from scenes.fenestration.thermal_file import SpectralTable
+from tests.bsdf.radiance_cells import write_radiance
 from tests.conftest import OWN_BLIND
 
 POLYGON = " a polygon p 0 0 9 0 0 0 1 0 0 0 1 0"
@@ -192,22 +193,29 @@ def test_coloured_slats_pass_in_each_band_what_slats_of_that_reflectance_pass(va
     (tmp_path / "paint.csv").write_text("wavelength_nm,reflectance\n380,0.1\n560,0.1\n620,0.7\n780,0.7\n")
     out = tmp_path / "red.xml"
     text = run("generate", *options, "--spectrum", tmp_path / "paint.csv", "--out", out).output
-    assert 'slats = "red_slats.csv"' in text
-    slats = SpectralTable(slats=tmp_path / "red_slats.csv").factor().slats
+    assert 'slats = "red_slats.json"' in text
+    slats = SpectralTable(slats=tmp_path / "red_slats.json").factor().slats
     area, grey = KLEMS_FULL.projected_solid_angles(), tmp_path / "grey.xml"
+    visible = read_bsdf_xml(out).band("Visible").transmission_front
+    powers = slats.reflectance ** (1 + np.arange(len(slats.shares)))[:, None]
+    powers /= visible_mean(powers)[:, None]
     for nm, reflectance in ((450, 0.1), (700, 0.7)):
         run("generate", *options, "--visible", reflectance, "--out", grey)
-        passed = area @ read_bsdf_xml(grey).band("Visible").transmission_front
-        # the same paths: rounding of the file, and the polynomial
-        np.testing.assert_allclose(slats.whole[:, nm - 380], passed, rtol=2e-3, atol=1e-3)
+        passed = read_bsdf_xml(grey).band("Visible").transmission_front
+        own = visible * (1 + np.tensordot(powers[:, nm - 380] - 1, slats.shares, 1))
+        # the same paths: rounding of the file, and the polynomial; by direction, and all of them
+        np.testing.assert_allclose(own, passed, atol=2e-3 * passed.max())
+        np.testing.assert_allclose(area @ own, area @ passed, rtol=2e-3, atol=1e-3)
     # all of them in visible light: more than at the mean reflectance, as light that is reflected twice
-    passed = area @ read_bsdf_xml(out).band("Visible").transmission_front
-    assert visible_mean(slats.whole) == pytest.approx(passed, rel=5e-3, abs=1e-3)
-    visible = float(visible_mean(np.interp(NANOMETRES, [560, 620], [0.1, 0.7])))
-    run("generate", *options, "--visible", visible, "--out", grey)
+    passed = area @ visible
+    mean = float(visible_mean(np.interp(NANOMETRES, [560, 620], [0.1, 0.7])))
+    run("generate", *options, "--visible", mean, "--out", grey)
     at_mean = area @ read_bsdf_xml(grey).band("Visible").transmission_front
     assert 1.01 < passed.mean() / at_mean.mean() < 1.03
-    assert (slats.straight <= slats.whole.min(axis=1)).all() and slats.straight.max() > 0.3
+    # what passes between the slats goes straight on
+    between = visible * (1 - slats.shares.sum(axis=0))
+    assert np.abs(between - np.diag(np.diag(between))).max() < 2e-3 * between.max()
+    assert (np.diag(between) * area).max() > 0.3
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from mitsuba_cfs.bsdf.generate import generate_klems
 from mitsuba_cfs.bsdf.glazing import uncoated_values
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_QUARTER
 from mitsuba_cfs.bsdf.layers import combine_layers
-from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial, clear_body, plastic, stacked
+from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial, clear_body, plastic
 from mitsuba_cfs.bsdf.screens import prism_panel
 
 INDEX = 1.5
@@ -21,6 +21,27 @@ def slab(variant):
     return generate_klems(
         prism_panel(INDEX, pitch=0.01, angle=0.0, thickness=0.004), KLEMS_QUARTER, samples=8192, seed=1
     ).bsdf[0]
+
+
+def stacked(layers: list[PeriodicLayer], gaps: list[float]) -> PeriodicLayer:
+    """Layers in series as one layer, the exterior one first, all on cells of one size.
+
+    Args:
+        gaps: clear distance between neighbouring layers [m].
+    """
+    if len(gaps) != len(layers) - 1 or min(gaps, default=1) <= 0:
+        raise ValueError("expected a positive gap between each two layers")
+    if len({layer.period for layer in layers}) != 1:
+        raise ValueError("the layers' cells are of different sizes")
+    triangles, material = [], []
+    materials: tuple[SlatMaterial, ...] = ()
+    top = 0.0
+    for layer, gap in zip(layers, [*gaps, 0.0], strict=True):
+        triangles.append(layer.triangles + np.array([0, 0, top - layer.depth_range[1]]))
+        material.append(layer.material + len(materials))
+        materials += layer.materials
+        top -= layer.thickness + gap
+    return PeriodicLayer(np.concatenate(triangles), np.concatenate(material), materials, layers[0].period)
 
 
 def test_a_slab_is_fresnel(slab):

@@ -14,23 +14,23 @@ from mitsuba_cfs.bsdf.spectral_factor import ANGLES, SlatLight, SpectralFactor
 from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, diffuse_reflectance
 from mitsuba_cfs.methods.optics import BsdfOptics
 from mitsuba_cfs.spectra.channels import channels_of
-from mitsuba_cfs.spectra.detectors import NANOMETRES
+from mitsuba_cfs.spectra.detectors import NANOMETRES, illuminant, visible_mean
 
 
 def test_a_shade_of_any_scale_is_the_same_and_a_neutral_one_is_one() -> None:
     red = np.where(NANOMETRES > 600, 0.8, 0.1)
     channels = channels_of(9)
-    one, tenth = (SpectralFactor.of_panes((), k * red).of_patches(channels).whole for k in (1, 0.1))
+    one, tenth = (SpectralFactor.of_panes((), k * red).of_patches(channels).straight for k in (1, 0.1))
     np.testing.assert_allclose(one, tenth, rtol=1e-12)
     assert one[-1].min() > 1 > one[0].max()
-    np.testing.assert_allclose(SpectralFactor.neutral().of_patches(channels).whole, 1.0, atol=1e-9)
+    np.testing.assert_allclose(SpectralFactor.neutral().of_patches(channels).straight, 1.0, atol=1e-9)
 
 
 def test_a_shade_that_passes_nothing_gives_no_nan() -> None:
     opaque = SpectralFactor.of_panes((), np.zeros(len(NANOMETRES)))
     channels = channels_of(5)
     assert np.isfinite(opaque.of_angles(channels)).all()
-    assert np.isfinite(opaque.of_patches(channels).whole).all()
+    assert np.isfinite(opaque.of_patches(channels).straight).all()
 
 
 def test_light_between_a_coloured_shade_and_glass_has_its_colour() -> None:
@@ -61,25 +61,18 @@ def test_colour_of_glass_as_seen() -> None:
     assert np.diag(passed) == pytest.approx(own[0] * np.diag(system.transmission), rel=1e-3)
 
 
-def test_slats_colour_what_they_reflect_and_not_what_passes_between_them() -> None:
-    channels, straight = channels_of(81), np.linspace(0.0, 0.5, KLEMS_FULL.size)
-    red = np.where(NANOMETRES > 600, 0.4, 0.1)
-    slats = SlatLight(straight, straight[:, None] + red)
+def test_slats_colour_what_they_reflect_by_the_number_of_reflections() -> None:
+    channels, red = channels_of(81), np.where(NANOMETRES > 600, 0.4, 0.1)
+    slats = SlatLight(red, np.full((2, KLEMS_FULL.size, KLEMS_FULL.size), 0.3))
     factor = replace(SpectralFactor.neutral(), slats=slats)
-    whole, scattered, between = factor.of_patches(channels)
-    assert between == pytest.approx(np.ones_like(between))
-    assert scattered == pytest.approx(np.repeat(scattered[:, :1], KLEMS_FULL.size, axis=1))
-    # the parts, by their shares of visible light, are the whole
-    visible = slats.whole[:, 0] * 0 + float(channels.mean(red) @ _visible(channels))
-    share = straight / (straight + visible)
-    assert whole == pytest.approx(share * between + (1 - share) * scattered, rel=2e-3)
-    assert scattered[-1, 0] > 2 > 1 > scattered[0, 0]
-    assert np.abs(whole - 1).max(axis=0)[-1] < 0.8 * np.abs(whole - 1).max(axis=0)[0]
-
-
-def _visible(channels) -> np.ndarray:
-    """Weights of the bands in visible light of D65 [C]."""
-    from mitsuba_cfs.spectra.detectors import illuminant
-
+    straight, reflected = factor.of_patches(channels)
+    assert straight == pytest.approx(np.ones_like(straight))
+    once, twice = reflected[..., 0]
+    ratio = visible_mean(red) ** 2 / visible_mean(red**2)
+    assert twice[[0, -1]] == pytest.approx(once[[0, -1]] ** 2 * ratio)
+    assert once[-1] / once[0] == pytest.approx(4.0) and twice[-1] / twice[0] == pytest.approx(16.0)
+    assert visible_mean(red) < 0.16 < 0.4 < once[-1] * visible_mean(red) + 1e-3
+    # in visible light all of them are 1
     weights = channels.detection[0] * channels.power(illuminant("D65"))
-    return weights / weights.sum()
+    assert reflected @ np.ones(KLEMS_FULL.size) @ weights == pytest.approx(KLEMS_FULL.size * weights.sum(), rel=2e-3)
+    assert factor.of_angles(channels)[1:, :, 0] == pytest.approx(reflected[..., 0])

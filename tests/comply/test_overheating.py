@@ -209,6 +209,7 @@ def test_every_rule_says_what_it_has_and_gives_no_verdict_without_its_conditions
     assert rule.included and rule.left_out
     weather = read_epw(WEATHER)  # Chicago, which no rule names
     assert rule.fits(weather) == (not rule.sites)
+    assert rule.weather_asked in ("", "DSY", "RE2020", "SIA 2028", "NEN 5060", "Rostock, Potsdam, Mannheim")
     for criterion in rule.criterion:
         if not any("heat" in need.parts for need in criterion.needs):
             continue

@@ -22,8 +22,8 @@ from scenes.comply.assess import (
     assess_room,
     values_of,
 )
-from scenes.comply.eye_needs import EyeDays
 from scenes.comply.findings import EyeLight, Findings, GridLight, SeatGlare, calendar_of
+from scenes.comply.needs import EyeDays
 from scenes.comply.rules import NOT_MET, read_rule, rule_named, rule_names
 from scenes.comply.sunlight import SunExposure
 from scenes.comply.tables import missed

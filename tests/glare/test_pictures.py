@@ -31,6 +31,13 @@ def test_tone_mapping_keeps_order_and_hue():
     assert not pictures.tone_mapped(np.zeros((2, 2))).any()
 
 
+def test_a_bright_blue_is_paler_and_does_not_turn_cyan():
+    blue = np.array([0.4, 0.7, 2.0])
+    red, green, top = (pictures.tone_mapped(np.array([[blue, 0.01 * blue, 3 * blue]] * 3))[0, 0] / 255.0) ** 2.2
+    # grey is mixed in: what the channels have more than the least keeps its proportion
+    assert (green - red) / (top - red) == pytest.approx(0.3 / 1.6, abs=0.03) and top == pytest.approx(1.0, abs=0.01)
+
+
 def test_falsecolour_shows_one_colour_for_one_luminance(tmp_path):
     path = tmp_path / "a.png"
     halves = np.where(np.arange(100)[:, None] < 50, 30.0, 3000.0) * np.ones((100, 100))

@@ -79,13 +79,6 @@ def test_daylight_hours_of_a_dark_year_follow_the_sun():
     assert mask.sum() == 4380 and mask[noon].all() and not mask[weather.midpoints.hour == 0].any()
 
 
-def test_whole_year():
-    mask = np.array([False, True, False, True])
-    np.testing.assert_array_equal(schedules.whole_year([[1.0, 2], [3, 4]], mask), [[0, 0], [1, 2], [0, 0], [3, 4]])
-    with pytest.raises(ValueError, match="mask of 1"):
-        schedules.whole_year([[1.0]], mask)
-
-
 # --- shares of time ---------------------------------------------------------------------------
 
 

@@ -178,3 +178,12 @@ def test_the_account_of_the_model_is_in_the_pages_language(result, language, acc
     for text in shown:
         assert not ENGLISH.search(text), text
     assert dict(summary(run))["Rooms read"] == dict(account.facts)["Rooms read"]
+
+
+def test_french_marks_stand_behind_a_narrow_space():
+    """Colon, semicolon, exclamation and question mark, percent: behind a space that does not break."""
+    texts = [text for text in catalogue.messages("fr") if text.id]
+    strings = [one for text in texts for one in (text.string if isinstance(text.string, tuple) else (text.string,))]
+    wrong = re.compile(r"[ \w)»}][;!?](?=\s|$)| [:%]|[a-zé)»}]:(?=\s|$)")
+    assert not [one for one in strings if wrong.search(one)]
+    assert wrong.search("un mot : faux") and wrong.search("un mot: faux") and wrong.search("5 %")

@@ -15,9 +15,9 @@ from bim.gbxml.write import write_gbxml
 from bim.report.issue import Effect, Issue, catalogue, issue_text
 from mitsuba_cfs.errors import DataError
 from scenes import cli
-from scenes.demo import VENETIAN_BLIND, WEATHER
+from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.explore.folder import copy_explorer, write_explorer
-from scenes.head import Head, head_of, joined
+from scenes.head import Head, head_of, issues_of, joined
 from scenes.input_files import read_files
 from scenes.input_options import InputOptions
 from scenes.inputs import read_inputs
@@ -281,3 +281,22 @@ def test_a_head_counts_further_problems_with_their_glass():
     assert last == "warning: 2 more problems: cfs check lists all (3.00 m2 of glass)"
     lines = Head((), (issues[0],)).lines
     assert not [line for line in lines if "more problem" in line]
+
+
+def test_a_head_names_no_problem_of_a_room_that_is_not_computed():
+    read = read_building_file(OFFICE)
+    south, east = read.spaces[:2]
+    code = next(code for code, one in catalogue().items() if one.severity == "warning")
+    values = {name: 1.0 for name in catalogue()[code].fields}
+    shared = {f.element for f in south.faces} & {f.element for f in east.faces} - {None}
+    wheres = [south.guid, south.windows[0].guid, east.guid, east.windows[0].guid, "the file", *sorted(shared)]
+    building = replace(read, issues=tuple(Issue(code, where, values) for where in wheres))
+    kept = {issue.where for issue in issues_of(building, [south])}
+    assert shared
+    assert kept == {*wheres} - {east.guid, east.windows[0].guid}
+    pair = Issue("rooms-joined-by-size", "opening", {"rooms": (east.label,), "area": 4.0, "limit": 3.0})
+    assert issues_of(replace(building, issues=(pair,)), [south]) == ()
+    assert issues_of(replace(building, issues=(pair,)), [east]) == (pair,)
+    lines = head_of(building, [south]).lines
+    assert "2 problems of rooms that are not computed are not listed: cfs check lists them" in lines
+    assert {issue.where for issue in head_of(building).issues} == {*wheres}

@@ -66,3 +66,7 @@ def test_a_near_command_is_proposed() -> None:
         group.resolve_command(click.Context(group), ["frobnicate"])
     assert "mean" not in str(error.value)
     assert "study" in COMMANDS
+    inner = LazyGroup().get_command(click.Context(group), "ifc")
+    assert isinstance(inner, click.Group)
+    with pytest.raises(click.UsageError, match="Did you mean 'info'"):
+        inner.resolve_command(click.Context(inner), ["inf"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,9 @@ from bim.doorways import opened, source_rooms
 from bim.model import Building
 from mitsuba_cfs.bsdf.evaluate import through_peak
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
+from mitsuba_cfs.spectra.channels import channels_of
+from mitsuba_cfs.spectra.detectors import NANOMETRES, visible_mean
 from scenes.demo import VENETIAN_BLIND, WEATHER
 from scenes.fenestration.systems import read_system, with_see_through
 from scenes.room.inner_glass import CLEAR, inner_glass
@@ -227,3 +231,25 @@ def test_run_computes_a_room_without_windows_and_says_what_it_borrows(two_rooms:
         "receives 100 % of its daylight through 5.6 m2 of inner glass and 0.0 m2 of open doorways "
         "from lit" in result.output
     )
+
+
+def test_light_through_inner_glass_has_the_colour_of_the_windows_beyond(three_rooms: Building) -> None:
+    """Red windows: the light of the room behind, and of the one behind that, is red."""
+    lit, last = three_rooms.space("lit"), three_rooms.space("last")
+    red = np.interp(NANOMETRES, [560.0, 620.0], [0.05, 0.5])
+    spectrum = SpectralFactor.of_panes((), red)
+    tinted = replace(read_system(VENETIAN_BLIND), spectrum=spectrum)
+    channels = channels_of(9)
+    expected = channels.mean(red) / visible_mean(red)
+    for name in ("dark", "last"):
+        found = inner_glass(three_rooms, three_rooms.space(name), in_all_windows(lit, tinted))
+        (one,) = found.spectra
+        assert one.of_patches(channels).straight[:, 0] == pytest.approx(expected)
+    neutral = inner_glass(three_rooms, last, in_all_windows(lit, read_system(VENETIAN_BLIND)))
+    assert neutral.spectra[0].of_patches(channels).straight == pytest.approx(1.0)
+
+
+def test_two_windows_of_different_colours_mix_by_the_light_that_they_pass() -> None:
+    red = np.interp(NANOMETRES, [560.0, 620.0], [0.05, 0.5])
+    both = SpectralFactor.of_diffuse_light([SpectralFactor.of_panes((), red), SpectralFactor.neutral()], [1.0, 3.0])
+    assert both.transmittance[0] / both.visible[0] == pytest.approx(0.25 * red / visible_mean(red) + 0.75)

@@ -29,15 +29,16 @@ TABLES = {"gains": {"lighting_w_m2": 10.0, "occupied": [0, 24]}, "loads": {"heat
 def of(variant, glass, milk, blind, weather, skies):
     """The year of the room with a table of `predictive`, and keys of its control."""
 
-    def year(limit: float, controller=None, **predictive) -> ControlYear:
+    def year(limit: float, controller=None, gains=None, **predictive) -> ControlYear:
         control = {"rule": "predictive", "limit_dgp": limit, "predictive": predictive}
+        tables = TABLES | {"gains": TABLES["gains"] | (gains or {})}
         room = room_inputs(
             TWO,
             TWO.spaces[0],
             in_all_windows(TWO.spaces[0], glass, milk, blind),
             weather,
             FEW,
-            operation=OperationTables.model_validate({"control": control} | TABLES),
+            operation=OperationTables.model_validate({"control": control} | tables),
             skies=skies,
             controller=controller,
         )
@@ -111,6 +112,23 @@ def test_the_glare_term_of_the_eye_is_used_where_it_is_asked_for(of) -> None:
     by_picture = Planner(of(0.32), room.operation, room.control.rules[0])
     assert by_picture.glare[list(HOURS)] == pytest.approx(0.95 * 5.87e-5 * eye + 0.16)
     assert not by_picture.rated.any()
+
+
+def test_plans_dim_each_zone_of_lamps_by_its_own_sensor(of) -> None:
+    """The lamps of the plan are those of the room's year in its states; a zone of all lamps changes nothing."""
+    facade = {"name": "facade", "at": [1.5, 0.5], "share": 0.6, "lighting_target_lx": 300.0}
+    zones = [facade, {"name": "back", "share": 0.4, "lighting_dimmed": False}]
+    year = of(0.32, gains={"lighting_zone": zones})
+    plan = Planner(year, year.room.operation, year.room.control.rules[0]).plan()
+    hours, lamps = list(HOURS), []
+    for hour in hours:
+        states = tuple(year.combinations[plan.states[hour]].tolist())
+        lamps.append(year.heat(states).lamps[hour])
+    assert plan.lamps[hours] == pytest.approx(lamps)
+    assert min(lamps) >= 0.4 * 10.0 * year.room.space.floor_area, "the back is not dimmed"
+    assert min(lamps) < 0.9 * 10.0 * year.room.space.floor_area
+    whole = of(0.32, gains={"lighting_zone": [{"name": "all", "share": 1.0}]})
+    assert np.array_equal(predictive_states(whole), predictive_states(of(0.32)))
 
 
 def test_plans_are_of_all_groups_and_need_light() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -30,7 +31,7 @@ from scenes.room.operation import read_operation, read_state
 from scenes.room.options import RoomOptions
 from scenes.room.room import inputs_of_room
 from scenes.room.spectral import _factors, room_spectral
-from scenes.room.surface_spectra import SurfaceTable, ground_reflectance, room_reflectance
+from scenes.room.surface_spectra import SurfaceTable, ground_reflectance, materials, room_reflectance
 from scenes.room.windows import in_all_windows
 from tests.scenes.test_tilts import family
 
@@ -107,7 +108,7 @@ def test_run_writes_tables_and_names_systems_without_a_spectrum(tmp_path) -> Non
 def test_spectrum_of_panes_and_shade(blind) -> None:
     factor = read_system(blind).spectrum
     assert isinstance(factor, SpectralFactor)
-    blue, _, red = factor.of_patches(channels_of(3)).whole[:, 0]
+    blue, _, red = factor.of_patches(channels_of(3)).straight[:, 0]
     assert blue == 0 and red > 1
     assert read_system(VENETIAN_BLIND).spectrum is None
 
@@ -130,20 +131,22 @@ def test_faults_of_a_spectrum(tmp_path, text: str, message: str) -> None:
 
 
 def test_a_file_of_coloured_slats_is_read_as_it_was_written_and_faults_are_named(tmp_path) -> None:
-    straight = np.linspace(0.0, 0.4, 145)
-    light = SlatLight(straight, straight[:, None] + np.interp(NANOMETRES, [380, 780], [0.1, 0.5]))
-    path = tmp_path / "slats.csv"
+    shares = np.linspace(0.0, 0.5, 2 * 145**2).reshape(2, 145, 145)
+    light = SlatLight(np.interp(NANOMETRES, [380, 780], [0.1, 0.5]), shares)
+    path = tmp_path / "slats.json"
     write_slat_light(light, path)
     found = SpectralTable(slats=path).factor()
-    assert found.slats.whole == pytest.approx(light.whole, abs=1e-4)
-    assert found.slats.straight == pytest.approx(straight, abs=1e-5) and found.mirrored is None
-    rows = path.read_text("utf-8").splitlines()
-    for lines, message in (
-        (rows[:-1], "a row for each of 145 patches"),
-        ([rows[0].replace("380", "381"), *rows[1:]], "expected the columns patch, straight, 380"),
-        ([rows[0], rows[1].replace("1,0,", "1,-0.1,", 1), *rows[2:]], "from 0 to 1"),
+    assert found.slats.shares == pytest.approx(shares, abs=1e-4)
+    assert found.slats.reflectance == pytest.approx(light.reflectance, abs=1e-5) and found.mirrored is None
+    text = path.read_text("utf-8")
+    for fault, message in (
+        (text.replace("380.0", "381.0", 1), "every 10 nm from 380 to 780"),
+        (text.replace('"reflectance":[0.1', '"reflectance":[-0.1', 1), "from 0 to 1"),
+        (json.dumps({**json.loads(text), "shares": shares[:, :, :3].tolist()}), "expected 145 x 145 patches"),
+        ("{}", "expected numbers of wavelength_nm, reflectance, shares"),
+        ("patch,straight", "is not JSON"),
     ):
-        path.write_text("\n".join(lines), "utf-8")
+        path.write_text(fault, "utf-8")
         with pytest.raises(DataError, match=message):
             SpectralTable(slats=path).factor()
     with pytest.raises(ValueError, match="expected shade or slats, got both"):
@@ -167,7 +170,7 @@ def test_a_spectrum_that_is_no_number_is_refused(tmp_path) -> None:
 def test_tilts_between_systems_are_not_noted_beside_these() -> None:
     states = tilt_states(family(), 10.0)
     room = SimpleNamespace(windows=SimpleNamespace(systems=[states]))
-    light = SimpleNamespace(light=SimpleNamespace(systems=[states]))
+    light = SimpleNamespace(light=SimpleNamespace(systems=[states]), inner=None)
     factors, notes = _factors(room, light)
     assert len(factors[0]) == len(states) == 8
     assert [note.split(":")[0] for note in notes] == ["milk 0", "milk 40", "milk 70"]
@@ -212,10 +215,10 @@ def test_layers_without_a_spectrum_are_named_and_a_stated_spectrum_goes_before(b
     whole = state_of(VENETIAN_BLIND, pane | gap, pane)
     # the amber fabric beside the blind's file is not lost by layers that do not know it
     beside = state_of(blind, pane | gap, plain)
-    assert beside.spectrum is not None and beside.spectrum.of_angles(channels_of(3))[0, 0] == 0
+    assert beside.spectrum is not None and beside.spectrum.of_angles(channels_of(3))[0, 0, 0] == 0
     for states, count in (((partial,), 1), ((whole, beside), 0)):
         room = SimpleNamespace(windows=SimpleNamespace(systems=[states]))
-        light = SimpleNamespace(light=SimpleNamespace(systems=[states]))
+        light = SimpleNamespace(light=SimpleNamespace(systems=[states]), inner=None)
         notes = _factors(room, light)[1]
         assert len(notes) == count
         assert all("other layers transmit all wavelengths equally" in note for note in notes)
@@ -263,10 +266,22 @@ def test_colours_of_surfaces_are_those_stated_then_those_of_the_model(tmp_path) 
     assert ground_reflectance((*tables, lawn)) == pytest.approx(lawn.shape()) and ground_reflectance(tables) is None
 
 
+def test_materials_have_their_measured_spectra() -> None:
+    """Shapes that other libraries show too: green at 550 nm, red edge of leaves beyond 700 nm, red clay."""
+    at = {name: np.interp([450.0, 550.0, 650.0, 750.0], NANOMETRES, rho) for name, rho in materials().items()}
+    assert len(at) == 8 and all(0 < values.min() and values.max() < 0.6 for values in at.values())
+    blue, green, red, edge = at["vegetation"]
+    assert green > 2 * max(blue, red) and edge > 4 * green
+    assert at["clay tile"][2] > 3 * at["clay tile"][0] and at["asphalt"][2] < 1.5 * at["asphalt"][0]
+    table = SurfaceTable(select="ground", material="sand")
+    assert ground_reflectance((table,)) == pytest.approx(materials()["sand"])
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('[[surface]]\nselect = "floor"\n', "expected spectrum or colour"),
+        ('[[surface]]\nselect = "floor"\n', "expected spectrum, colour or material"),
+        ('[[surface]]\nselect = "ground"\nmaterial = "grass"\n', "expected one of asphalt, concrete, .*, got 'grass'"),
         ('[[surface]]\nselect = "floor"\ncolour = "red"\n', "expected #rrggbb"),
         ('[[surface]]\nselect = "floor"\nspectrum = "none.csv"\n', "no such file: none.csv"),
         ('[[surface]]\nselect = "floor"\nspectrum = "bad.csv"\n', "from 380 to 780 nm"),

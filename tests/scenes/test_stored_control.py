@@ -8,12 +8,14 @@ import ifcopenshell
 import pytest
 
 import scenes as cfs
+from bim.ifc.building import read_ifc
 from bim.ifc.control import KIND, StoredGroup, read_control, write_control
 from mitsuba_cfs.errors import DataError
 from scenes.cli import run
 from scenes.demo import OFFICE
-from scenes.room.control_groups import control_groups
+from scenes.room.control_groups import control_groups, shared_groups
 from scenes.room.operation import read_operation
+from scenes.room.shading_rules import stated_keys
 
 RULES = """
 [control]
@@ -88,6 +90,35 @@ def test_rules_come_back_from_the_model_as_they_were(written, tmp_path, rules) -
         assert found.names == expected.names and found.rules == expected.rules
         assert found.number.tolist() == expected.number.tolist()
     assert operation.tables.control.predictive == stated.control.predictive
+
+
+ACROSS = """
+[control]
+rule = "irradiance"
+close_above = 180.0
+hold_h = 2
+across = "building"
+groups = "room"
+sensor_rooms = ["{room}"]
+"""
+
+
+def test_a_group_of_several_rooms_is_one_group_of_the_model(written, tmp_path) -> None:
+    building = read_ifc(OFFICE)
+    spaces = [space for space in building.spaces if space.windows]
+    assert len(spaces) > 1
+    out = written(ACROSS.format(room=spaces[0].guid))
+    stored = read_control(out)
+    expected = shared_groups(building, read_operation(tmp_path / "rules.toml").tables)
+    assert {one.name: set(one.windows) for one in stored} == {
+        one.name: {w.guid for windows in one.windows.values() for w in windows} for one in expected
+    }
+    assert max(len(one.windows) for one in expected) > 1
+    back = shared_groups(building, taken(out, tmp_path).tables)
+    assert [one.name for one in back] == [one.name for one in expected]
+    for one, other in zip(back, expected, strict=True):
+        assert one.windows == other.windows and one.sensor_rooms == other.sensor_rooms
+        assert stated_keys(one.rule) == stated_keys(other.rule)
 
 
 def test_the_groups_are_those_of_ifc_and_are_replaced(written, tmp_path) -> None:

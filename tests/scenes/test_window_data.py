@@ -286,6 +286,8 @@ def test_a_panes_file_lies_beside_the_toml(tmp_path, real_data):
     [
         ("u_slope = 0.1\n", "u_slope"),
         ("u_slope = 0.005\nsurface = [1, 0, 0, 0, 0, 0]\n", "exclude each other"),
+        ("conductance = { mean_c = [0, 10], difference_k = [1, 5], values = [[1, 2]] }\n", "expected 2 rows of 2"),
+        ("conductance = { mean_c = [0, 10, 12], difference_k = [1, 5], values = [[1, 2]] }\n", "equal steps"),
         ('u_model = "constant"\nu_slope = 0.005\n', 'belongs to u_model "linear"'),
         ('u_model = "layers"\n', "belong together"),
         (LAYERS.replace("emissivity", "emisivity"), r"layers.*emisivity.*emissivity"),

@@ -111,6 +111,12 @@ JOBS = {
         "out.ifc",
     ),
     "pv": to_folder("pv", OFFICE, "--weather", WEATHER, "--study", PV_STUDY),
+    "site neighbours": to_folder(
+        "site", "neighbours", OFFICE, "--weather", WEATHER, "--proposed", REPOSITORY / "tests/site/tower.obj"
+    ),
+    "site reflections": to_folder(
+        "site", "reflections", OFFICE, "--weather", WEATHER, "--points", REPOSITORY / "tests/site/street.csv"
+    ),
     "dgp": to_folder("dgp"),
     "explore": Job(lambda inputs, out: ["explore", _explorer(inputs), "--out", out], folder=True),
     "study": Job(_study, folder=True),
@@ -130,6 +136,7 @@ JOBS = {
     "export --gltf": Job(lambda _, out: ["export", OFFICE, "--gltf", out], "out.glb"),
     "ifc templates": to_folder("ifc", "templates"),
     "ifc bonsai": Job(lambda _, out: ["ifc", "bonsai", "--out", out], "out.zip"),
+    "ifc info": Job(lambda _, out: ["ifc", "info", OFFICE, "--json", out], "out.json"),
     "ifc survey": Job(lambda _, out: ["ifc", "survey", OFFICE, "--markdown", out], "out.md"),
     "bsdf plot": Job(lambda _, out: ["bsdf", "plot", VENETIAN_BLIND, "--incident", 40, 0, "--out", out], "out.png"),
     "bsdf thermal": Job(lambda _, out: ["bsdf", "thermal", VENETIAN_BLIND, "--out", out], "out.csv"),

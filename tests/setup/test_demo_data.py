@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from scenes import demo
-from scenes.demo import make_office
-from scenes.demo.make_office import LAYERS, REFLECTANCES, u_value
+from tests.demo import make_office
+from tests.demo.make_office import LAYERS, REFLECTANCES, u_value
 
 
 @pytest.fixture(scope="module")

@@ -75,9 +75,9 @@ def acting(hours: int, seed: int = 3, **changed) -> PredictedHours:
     random = np.random.default_rng(seed)
     values = {
         "sun": random.uniform(0, 2500, (hours, 2)),
-        "daylight": random.uniform(0, 800, (hours, 2)),
+        "daylight": random.uniform(0, 800, (hours, 2, 1)),
         "lamps": np.full(hours, 400.0),
-        "dimming": DIMMING,
+        "zones": ((1.0, DIMMING),),
         "internal": np.full(hours, 200.0),
         "penalty": np.zeros((hours, 2)),
     } | changed
@@ -88,7 +88,8 @@ def cost_of(zone: ReducedZone, hours: PredictedHours, states, start_c: float) ->
     """Energy of a sequence of states [Wh], hour by hour."""
     mass_c, total, out = start_c, 0.0, np.zeros(6)
     for h, m in enumerate(states):
-        lamps = hours.lamps[h] * dimmed_share(hours.daylight[h, m], DIMMING)
+        shares = zip(hours.zones, hours.daylight[h, m], strict=True)
+        lamps = hours.lamps[h] * sum(of * (dimmed_share(lx, one) if one else 1.0) for (of, one), lx in shares)
         responses(
             zone.air[h],
             zone.windows[m],
@@ -109,9 +110,15 @@ def cost_of(zone: ReducedZone, hours: PredictedHours, states, start_c: float) ->
     return total
 
 
-@pytest.mark.parametrize(("mass", "seed"), [(MASS, 3), (5e5, 3), (5e5, 4), (5e5, 5)])
-def test_a_plan_is_the_cheapest_of_all_sequences(mass, seed) -> None:
+ZONES = ((0.5, DIMMING), (0.3, Dimming(300.0)), (0.2, None))  # the last without a photosensor
+
+
+@pytest.mark.parametrize(("mass", "seed", "zones"), [(MASS, 3, 1), (5e5, 3, 1), (5e5, 4, 3), (5e5, 5, 3)])
+def test_a_plan_is_the_cheapest_of_all_sequences(mass, seed, zones) -> None:
     zone, hours = zone_of(8, mass=mass), acting(8, seed)
+    if zones > 1:
+        day = np.random.default_rng(seed).uniform(0, 800, (8, 2, 3))
+        hours = replace(hours, daylight=day, zones=ZONES)
     plan = predicted_year(zone, hours, ahead=8, start_c=21.0)
     every = {s: cost_of(zone, hours, s, 21.0) for s in product((0, 1), repeat=8)}
     chosen = cost_of(zone, hours, plan.states.tolist(), 21.0)
@@ -125,7 +132,7 @@ def test_a_plan_with_moves_that_cost_is_the_cheapest_of_all_sequences(move_wh) -
     """Two groups of two states: each that moves in an hour costs; before the first all are open."""
     random, hours = np.random.default_rng(5), 5
     zone = zone_of(hours, windows=np.array([15.0, 13.5, 13.5, 12.0]))
-    many = {key: random.uniform(0, top, (hours, 4)) for key, top in (("sun", 2500.0), ("daylight", 800.0))}
+    many = {"sun": random.uniform(0, 2500, (hours, 4)), "daylight": random.uniform(0, 800, (hours, 4, 1))}
     acts = acting(hours, **many, penalty=np.zeros((hours, 4)), counts=(2, 2), move_wh=move_wh)
     plan = predicted_year(zone, acts, ahead=hours, start_c=21.0)
     assert (plan.states != predicted_year(zone, replace(acts, move_wh=0.0), ahead=hours).states).any()
@@ -237,9 +244,9 @@ def test_the_reduced_model_has_the_loads_of_the_detailed_balance() -> None:
     reduced = reduced_zone(zone, weather, solar.facade, np.zeros((1, 1), dtype=np.int64))
     acts = PredictedHours(
         (solar.inside.sum(axis=1) + absorbed)[:, None],
-        np.zeros((len(hours), 1)),
+        np.zeros((len(hours), 1, 1)),
         np.zeros(len(hours)),
-        None,
+        ((1.0, None),),
         300 * used,
         np.zeros((len(hours), 1)),
     )
@@ -257,6 +264,6 @@ def test_a_zone_insulated_inside_has_a_model_without_mass() -> None:
     cold = climate(24, outdoor=np.zeros(24), sky=np.zeros(24))
     one = reduced_zone(zone, cold, np.zeros((24, 1)), np.zeros((1, 0), dtype=np.int64))
     none = np.zeros((24, 1))
-    acts = PredictedHours(none, none, np.zeros(24), None, np.zeros(24), none)
+    acts = PredictedHours(none, none[..., None], np.zeros(24), ((1.0, None),), np.zeros(24), none)
     assert one.mass == 0.0
     assert predicted_year(one, acts, ahead=2).heating.min() > 0

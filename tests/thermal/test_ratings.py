@@ -105,6 +105,20 @@ def test_command_rates_a_state_and_writes_what_the_balance_takes(tmp_path, shade
     assert again.shading_position == "internal"
 
 
+PANES = LAYERS[LAYERS.index("[[layers]]") :].partition("gap = { width = 0.05 }")[0]
+
+
+def test_written_data_of_panes_give_the_same_resistance_at_any_temperatures(tmp_path, shade):
+    shade.with_suffix(".toml").write_text(PANES)
+    written = tmp_path / "again.toml"
+    assert cli.run(["bsdf", "thermal", str(shade), "--toml", str(written)]) == 0
+    layers, again = ThermalFile.read(shade.with_suffix(".toml")), ThermalFile.read(written)
+    assert again.closure.u_model == "surface"
+    mean, difference = (v.ravel() for v in np.meshgrid(np.linspace(-25.0, 75.0, 23), np.linspace(0.5, 45.0, 31)))
+    expected = layers.closure.layers(None).resistance.at(mean, difference)
+    np.testing.assert_allclose(again.closure.surface.at(mean, difference), expected, rtol=1e-5)
+
+
 def test_command_gives_uv_and_colours_of_panes_by_wavelength(tmp_path, shade, capsys):
     """Clear panes by closed form: each grey but for a red cut, which the other passes on."""
     nm = np.arange(300, 2501, 5)

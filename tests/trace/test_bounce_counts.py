@@ -20,19 +20,13 @@ UP = np.tile([0.0, 0.0, 1.0], (3, 1))
 
 def views(interior: Surfaces, *, samples: int, depth: int, by: bool = True, seed: int = 0):
     from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.path_options import PathOptions
     from mitsuba_cfs.trace.kernels.rooms import TracedRoom
     from mitsuba_cfs.trace.matrices.view import views_of_rooms
 
     room = TracedRoom(interior, tuple(rooms.test_room()[1]), POINTS, UP)
-    (found,) = views_of_rooms(
-        [room],
-        by_groups=[GROUPS] if by else (),
-        with_direct=True,
-        samples=samples,
-        max_depth=depth,
-        stopping=Stopping(batches=4),
-        seed=seed,
-    )
+    paths = PathOptions(samples, depth, Stopping(batches=4), seed)
+    (found,) = views_of_rooms([room], paths, by_groups=[GROUPS] if by else (), with_direct=True)
     return found
 
 
@@ -77,15 +71,16 @@ def test_against_differences(group):
 
 def test_of_rooms_together_they_are_those_of_each_alone():
     from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.path_options import PathOptions
     from mitsuba_cfs.trace.kernels.rooms import TracedRoom
     from mitsuba_cfs.trace.matrices.view import views_of_rooms
 
     room, groups = rooms.test_room()
     both = [TracedRoom(one, tuple(groups), POINTS, UP) for one in (room, scaled(room, 2, 0.5))]
-    few = {"samples": 64, "max_depth": 8, "stopping": Stopping(batches=2)}
-    together = views_of_rooms(both, by_groups=[GROUPS, GROUPS], **few)
+    few = PathOptions(64, 8, Stopping(batches=2))
+    together = views_of_rooms(both, few, by_groups=[GROUPS, GROUPS])
     for one, of_both in zip(both, together, strict=True):
-        (alone,) = views_of_rooms([one], by_groups=[GROUPS], **few)
+        (alone,) = views_of_rooms([one], few, by_groups=[GROUPS])
         for a, b in zip(alone.by_reflectance, of_both.by_reflectance, strict=True):
             assert abs(a.values.sum() - b.values.sum()) < 1e-3 * a.values.sum()
 

@@ -21,6 +21,7 @@ PATHS = {2: [148.4, 109.7, 86.7, 74.1, 93.8], 3: [21.9, 18.0, 16.0, 16.4, 16.4]}
 def test_straight_on_the_glass_has_what_the_window_before_it_has() -> None:
     """Both normal patches: nothing between, so the glass has T D of the window, and no more."""
     from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.kernels.path_options import PathOptions
     from mitsuba_cfs.trace.matrices.adjacent import adjacent_daylight
 
     def group(name: str, y: float, place: tuple) -> WindowGroup:
@@ -29,9 +30,8 @@ def test_straight_on_the_glass_has_what_the_window_before_it_has() -> None:
     wide = group("window", FIRST - 0.5, ((-3, 7), (-3, 6)))
     patches = np.arange(1.0, KLEMS_FULL.size + 1)[None, :, None]
     black = surfaces([(upright(FIRST, GLASS, north=True), 0.0)])
-    found = adjacent_daylight(
-        black, [wide], patches, [group("glass", FIRST, GLASS)], samples=64, stopping=Stopping(2)
-    ).values[0, :, 0]
+    glass = [group("glass", FIRST, GLASS)]
+    found = adjacent_daylight(black, [wide], patches, glass, PathOptions(64, 32, Stopping(2))).values[0, :, 0]
     # up to 60 degrees every ray meets the window, which has the same patches there
     near = KLEMS_FULL.centres()[0] < np.radians(60)
     np.testing.assert_allclose(found[near], patches[0, near, 0], rtol=1e-6)

@@ -254,12 +254,16 @@ def test_panes_before_a_screen_do_not_take_its_light():
 
 
 def test_cells_of_a_screen_have_its_light():
-    from mitsuba_cfs.trace.matrices.daylight import cell_daylight
+    from mitsuba_cfs.trace.kernels.path_options import PathOptions
+    from mitsuba_cfs.trace.kernels.rooms import TracedRoom
+    from mitsuba_cfs.trace.matrices.daylight import cells_of_rooms
     from mitsuba_cfs.window_parts import window_cells
 
     alone, both = panes_before_a_screen()
     expected, found = (
-        cell_daylight(rooms.obstruction(), groups, [window_cells(g) for g in groups], samples=4, max_depth=1)[0]
+        cells_of_rooms(
+            [TracedRoom(rooms.obstruction(), groups)], None, [[window_cells(g) for g in groups]], [PathOptions(4, 1)]
+        )[0][0]
         for groups in ([alone], both)
     )
     # the same rays straight to the sky
@@ -267,6 +271,7 @@ def test_cells_of_a_screen_have_its_light():
 
 
 def test_a_sensor_sees_the_outdoors_through_a_screen():
+    from mitsuba_cfs.trace.kernels.path_options import PathOptions
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
     from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
 
@@ -275,7 +280,9 @@ def test_a_sensor_sees_the_outdoors_through_a_screen():
     outside, eye = rooms.obstruction(), [[1.8, 2.0, 0.8]]
     clear = KlemsScattering(KLEMS_FULL, np.zeros((145, 145)), np.full(145, 0.5))
     expected, found = (
-        straight_view_matrix(room, outside, groups, systems, eye, [UP], subdivision=1, max_depth=1).values[0]
+        straight_view_matrix(
+            room, outside, groups, systems, eye, [UP], paths=PathOptions(1024, 1), subdivision=1
+        ).values[0]
         for groups, systems in (([alone], [clear]), (both, [clear, None]))
     )
     # the same rays straight to the sky
@@ -285,6 +292,7 @@ def test_a_sensor_sees_the_outdoors_through_a_screen():
 @pytest.mark.parametrize("direction", [(0, -1, 0), UP])
 def test_a_sensor_at_the_glass_sees_the_outdoors_as_by_its_solid_angle(direction):
     """Points of the window's area alone were 80 % off at 1 cm."""
+    from mitsuba_cfs.trace.kernels.path_options import PathOptions
     from mitsuba_cfs.trace.kernels.scattering import AngularScattering
     from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
     from mitsuba_cfs.trace.matrices.view import view_matrix
@@ -296,7 +304,7 @@ def test_a_sensor_at_the_glass_sees_the_outdoors_as_by_its_solid_angle(direction
     clear = AngularScattering([0.5, 0.5], [0.0, 0.0])
     systems = [clear] + [None] * (len(groups) - 1)
     found = straight_view_matrix(
-        room, Surfaces.none(), groups, systems, points, [direction] * 5, subdivision=1, samples=2048, max_depth=1
+        room, Surfaces.none(), groups, systems, points, [direction] * 5, paths=PathOptions(2048, 1), subdivision=1
     ).values[0]
     view = view_matrix(room, groups, points, [direction] * 5, samples=256, max_depth=1)
     np.testing.assert_allclose(found.sum(axis=1), 0.5 * view.values[:, 0].sum(axis=1), rtol=0.03)

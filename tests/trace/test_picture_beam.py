@@ -11,6 +11,7 @@ import pytest
 
 import mitsuba_cfs as cfs
 from mitsuba_cfs.images.view import pixel_directions
+from mitsuba_cfs.trace.kernels.path_options import PathOptions
 from mitsuba_cfs.trace.kernels.pixel_rows import PictureRows, tile_size
 from mitsuba_cfs.trace.kernels.sampling import vectors
 from mitsuba_cfs.trace.kernels.scene import TracedScene
@@ -41,7 +42,7 @@ def test_a_slit_of_sky_lights_a_wall_evenly() -> None:
     chosen = np.flatnonzero(np.isin(rows.row, rows.row[high]))
     points = place[chosen] + [1e-3, 0, 0]
     normals = np.tile([1.0, 0.0, 0.0], (len(points), 1))
-    exact = straight_view_matrix(*around, points, normals, samples=8192, max_depth=1).values[0]
+    exact = straight_view_matrix(*around, points, normals, paths=PathOptions(8192, 1)).values[0]
     sky = np.ones(exact.shape[1])
     sky[0] = 0  # the ground
     lit = np.bincount(rows.row[chosen], box.WALLS / np.pi * (exact @ sky))

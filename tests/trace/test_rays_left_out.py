@@ -82,7 +82,7 @@ def test_cells_hold_the_places_that_their_rays_start_from_and_others_do_not_matt
     assert len(np.unique(own)) > 0.99 * narrow.size  # from all over the wider ones
 
     sensors = np.array([[1.8, 1.0, 0.8], [1.0, 3.0, 0.8]]), np.tile([0.0, 0.0, 1.0], (2, 1))
-    share = sunlit_sensors.room_shares((narrow, wide), inside, sensors, samples=256)
+    share = sunlit_sensors.shares_and_derivatives((narrow, wide), inside, sensors, samples=256)[0]
     between, sent = sunlit_sensors._between, []
 
     def of_all(cells, scene, met, *options):
@@ -90,6 +90,6 @@ def test_cells_hold_the_places_that_their_rays_start_from_and_others_do_not_matt
         return between(cells, scene, np.arange(cells.cells.size), *options)
 
     monkeypatch.setattr(sunlit_sensors, "_between", of_all)
-    all_rows = sunlit_sensors.room_shares((narrow, wide), inside, sensors, samples=256)
+    all_rows = sunlit_sensors.shares_and_derivatives((narrow, wide), inside, sensors, samples=256)[0]
     np.testing.assert_allclose(share, all_rows, rtol=1e-12)
     assert sent[0] < 0.6 * wide.cells.size  # the backs of walls are as many

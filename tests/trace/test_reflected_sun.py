@@ -189,7 +189,7 @@ def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.trace.kernels.scene import TracedScene
     from mitsuba_cfs.trace.sun.sunlit_cells import Beam
-    from mitsuba_cfs.trace.sun.sunlit_sensors import CELL_RAYS, room_cells, room_light, room_shares
+    from mitsuba_cfs.trace.sun.sunlit_sensors import CELL_RAYS, room_cells, room_light, shares_and_derivatives
 
     room = rooms.surfaces([(square(k, at), 0.6) for k in range(3) for at in (0.0, 3.0)])
     group = hole()
@@ -204,7 +204,7 @@ def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
     side, normals = np.repeat(np.arange(6), n), np.zeros((6 * n, 3))
     places[np.arange(6 * n), side // 2] = np.where(side % 2, 2.995, 0.005)
     normals[np.arange(6 * n), side // 2] = np.where(side % 2, -1.0, 1.0)
-    share = room_shares(cells, inside, (places, normals), samples=256)
+    share = shares_and_derivatives(cells, inside, (places, normals), samples=256)[0]
     sun = towards(40, 20)[None]
     way = BsdfOptics(clear_glass()).scattering
     [lux] = room_light([share], Beam((inside, outside), 0, way).flux(cells[0], sun), np.array([LUX]))
@@ -218,7 +218,7 @@ def test_a_room_keeps_the_flux_of_a_beam_and_reflects_it_as_a_furnace_does():
 
 def test_few_rays_of_a_sensor_ask_for_few_from_the_cells_with_the_same_light():
     from mitsuba_cfs.trace.kernels.scene import TracedScene
-    from mitsuba_cfs.trace.sun.sunlit_sensors import CELL_LEAST, CELL_RAYS, room_cells, room_shares
+    from mitsuba_cfs.trace.sun.sunlit_sensors import CELL_LEAST, CELL_RAYS, room_cells, shares_and_derivatives
 
     room = rooms.surfaces([(square(k, at), 0.6) for k in range(3) for at in (0.0, 3.0)])
     inside = TracedScene(room, [hole()])
@@ -227,7 +227,7 @@ def test_few_rays_of_a_sensor_ask_for_few_from_the_cells_with_the_same_light():
     for samples, rays in ((128, CELL_LEAST), (32 * CELL_RAYS, CELL_RAYS)):
         cells = room_cells(inside, samples=samples)
         assert cells[1].rays == rays and cells[1].starts.size == rays * cells[1].cells.size
-        share = room_shares(cells, inside, sensors, samples=4096)
+        share = shares_and_derivatives(cells, inside, sensors, samples=4096)[0]
         found.append(share @ cells[0].area)
     np.testing.assert_allclose(*found, rtol=0.005)
 
@@ -263,7 +263,7 @@ def test_a_sensor_close_to_a_sunlit_wall_has_the_part_of_it_above_its_horizon():
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.trace.kernels.scene import TracedScene
     from mitsuba_cfs.trace.sun.sunlit_cells import Beam
-    from mitsuba_cfs.trace.sun.sunlit_sensors import room_cells, room_light, room_shares
+    from mitsuba_cfs.trace.sun.sunlit_sensors import room_cells, room_light, shares_and_derivatives
 
     sides = [(k, at) for k in range(3) for at in (0.0, 3.0)]
     room = rooms.surfaces([(square(k, at), 0.5 if (k, at) == (0, 0.0) else 0.0) for k, at in sides])
@@ -281,7 +281,7 @@ def test_a_sensor_close_to_a_sunlit_wall_has_the_part_of_it_above_its_horizon():
     found = []
     for seed in range(3):
         sensor = place[None], np.array([[0.0, 0.0, 1.0]])
-        share = room_shares(cells, inside, sensor, samples=65_536, seed=seed)
+        share = shares_and_derivatives(cells, inside, sensor, samples=65_536, seed=seed)[0]
         flux = Beam((inside, outside), 0, beam, seeds=(seed,)).flux(cells[0], sun[None])
         found.append(room_light([share], flux, np.array([LUX]))[0][0, 0])
     assert np.mean(found) == pytest.approx(expected, rel=0.08)  # 0.05, and 0.02 of noise

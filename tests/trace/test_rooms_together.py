@@ -48,10 +48,11 @@ def three_rooms():
 
 @pytest.mark.parametrize("depth", [1, 32])
 def test_rooms_together_have_the_matrices_of_each_alone(depth):
+    from mitsuba_cfs.trace.kernels.path_options import PathOptions
     from mitsuba_cfs.trace.matrices.view import view_matrix, views_of_rooms
 
     several = three_rooms()
-    together = views_of_rooms(several, max_depth=depth, with_direct=True, **FEW)
+    together = views_of_rooms(several, PathOptions(max_depth=depth, **FEW), with_direct=True)
     for room, (found, direct, _) in zip(several, together, strict=True):
         alone = view_matrix(room.surfaces, room.groups, room.points, room.directions, max_depth=depth, **FEW)
         assert found.values.shape == alone.values.shape
@@ -59,7 +60,7 @@ def test_rooms_together_have_the_matrices_of_each_alone(depth):
         assert change < 2e-5, f"{change:.1e} of the light"
         error = found.sum_error.mean() / alone.sum_error.mean()
         assert error == pytest.approx(1.0, rel=1e-2)
-        again = views_of_rooms([room], max_depth=1, **FEW)[0].whole
+        again = views_of_rooms([room], PathOptions(max_depth=1, **FEW))[0].whole
         assert np.abs(direct.values - again.values).sum() < 2e-5 * again.values.sum()
         assert np.allclose(found.covariance, alone.covariance, rtol=0.05, atol=1e-6)
 
@@ -90,13 +91,14 @@ def facade():
 
 @pytest.mark.parametrize("depth", [1, 16])
 def test_windows_together_have_the_daylight_of_each_alone(depth):
+    from mitsuba_cfs.trace.kernels.path_options import PathOptions
     from mitsuba_cfs.trace.matrices.daylight import daylight_matrix, daylight_of_rooms
 
     each, outdoors = facade()
-    options = {"max_depth": depth, "subdivision": 1, "samples": 64, "seed": 2}
-    together = daylight_of_rooms(each, outdoors, **options)
+    options = {"max_depth": depth, "samples": 64, "seed": 2}
+    together = daylight_of_rooms(each, outdoors, PathOptions(**options), subdivision=1)
     for room, found in zip(each, together, strict=True):
-        alone = daylight_matrix(room.surfaces, room.groups, **options)
+        alone = daylight_matrix(room.surfaces, room.groups, subdivision=1, **options)
         change = np.abs(found.values - alone.values).sum() / alone.values.sum()
         assert change < 1e-4, f"{change:.1e} of the light"
         assert found.values.sum() == pytest.approx(alone.values.sum(), rel=1e-5)
@@ -105,6 +107,7 @@ def test_windows_together_have_the_daylight_of_each_alone(depth):
 
 def test_windows_together_before_a_mountain_have_the_daylight_of_each_alone():
     """Surroundings that reach kilometres do not make the rooms' own windows less exact."""
+    from mitsuba_cfs.trace.kernels.path_options import PathOptions
     from mitsuba_cfs.trace.kernels.rooms import joined_surfaces
     from mitsuba_cfs.trace.matrices.daylight import daylight_matrix, daylight_of_rooms
 
@@ -113,8 +116,9 @@ def test_windows_together_before_a_mountain_have_the_daylight_of_each_alone():
     mountain = Surfaces(slope, np.full(2, 0.5), np.zeros(2))
     before = SharedOutdoors(joined_surfaces([mountain, outdoors.surfaces]), np.append([-1, -1], outdoors.owner))
     far = [replace(one, surfaces=joined_surfaces([mountain, one.surfaces])) for one in each]
-    options = {"max_depth": 16, "subdivision": 1, "samples": 64, "seed": 2}
-    for room, found in zip(far, daylight_of_rooms(far, before, **options), strict=True):
-        alone = daylight_matrix(room.surfaces, room.groups, **options)
+    options = {"max_depth": 16, "samples": 64, "seed": 2}
+    together = daylight_of_rooms(far, before, PathOptions(**options), subdivision=1)
+    for room, found in zip(far, together, strict=True):
+        alone = daylight_matrix(room.surfaces, room.groups, subdivision=1, **options)
         change = np.abs(found.values - alone.values).sum() / alone.values.sum()
         assert change < 1e-3, f"{change:.1e} of the light"

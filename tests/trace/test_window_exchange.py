@@ -41,12 +41,13 @@ def small(name: str, centre, normal) -> WindowGroup:
 
 def test_windows_that_face_each_other_see_what_leaves_towards_them() -> None:
     """The patches are those that a file names them by: aside, and one window above the other."""
+    from mitsuba_cfs.trace.kernels.path_options import PathOptions
     from mitsuba_cfs.trace.matrices.adjacent import outdoor_exchange
 
     far = rooms.surfaces([(rooms.quad((0, 9, 9), (1, 9, 9), (1, 9, 8), (0, 9, 8)), 0.0)])
     places = np.array([[0.0, 0.0, 1.0], [1.0, -0.8, 1.6]])
     groups = [small("north", places[0], [0, -1, 0]), small("south", places[1], [0, 1, 0])]
-    found = outdoor_exchange(far, groups, samples=4096).values.reshape(2, K, 2, K)
+    found = outdoor_exchange(far, groups, PathOptions(4096, 16)).values.reshape(2, K, 2, K)
     for here, there in ((0, 1), (1, 0)):
         way = normalize(places[there] - places[here])
         came, went = np.unravel_index(np.argmax(found[here, :, there]), (K, K))
@@ -63,6 +64,7 @@ def test_windows_that_face_each_other_see_what_leaves_towards_them() -> None:
 
 
 def test_all_that_leaves_into_a_white_box_comes_back() -> None:
+    from mitsuba_cfs.trace.kernels.path_options import PathOptions
     from mitsuba_cfs.trace.matrices.adjacent import outdoor_exchange
 
     box = rooms.surfaces(
@@ -76,7 +78,7 @@ def test_all_that_leaves_into_a_white_box_comes_back() -> None:
     )
     pane = rooms.quad((-1, 0, 0), (3, 0, 0), (3, 0, 3), (-1, 0, 3))
     groups = [WindowGroup("front", (WindowSurface("front", pane),))]
-    found = outdoor_exchange(box, groups, samples=256, max_depth=64).values
+    found = outdoor_exchange(box, groups, PathOptions(256, 64)).values
     assert found.sum(axis=2) == pytest.approx(1.0, abs=0.12)
     assert OMEGA @ found[0].sum(axis=1) / np.pi == pytest.approx(1.0, rel=0.01)
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,7 +20,7 @@ from mitsuba_cfs.bsdf.en410 import solar_value
 from mitsuba_cfs.bsdf.glazing import BRONZE_SHAPE, CLEAR_ABOVE, CLEAR_SHAPE
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.bsdf.layers import combine_layers
-from mitsuba_cfs.bsdf.spectral_factor import SpectralFactor
+from mitsuba_cfs.bsdf.spectral_factor import SlatLight, SpectralFactor
 from mitsuba_cfs.bsdf.spectral_pane import SpectralPane, read_spectral_pane, spectral_transmittance
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods.light import daylight
@@ -31,17 +33,26 @@ from mitsuba_cfs.spectra.channels import Channels
 from mitsuba_cfs.spectra.daylight import OVERCAST_K, daylight_components, daylight_shares, sun_spectra
 from mitsuba_cfs.spectra.detectors import NANOMETRES, colour_temperature, detected, equivalent_daylight, visible_mean
 from mitsuba_cfs.surfaces import Surfaces
+from scenes.bsdf_generation import generated_file
+from scenes.fenestration.thermal_file import reflectance_of_code
 from tests.radiance import polygon, run
 
 FABRIC = np.interp(NANOMETRES, [380, 500, 540, 780], [0.05, 0.05, 0.4, 0.4])  # amber
-WINDOWS = {  # panes of the IGSDB in ../shared/data, from outside to inside, and a fabric indoors
+# Panes of the IGSDB, from outside to inside, and a fabric indoors, or the colour of slats outdoors.  Product 7407
+# is no part of ../shared/data: github.com/LBNL-ETA/frads has it in Examples/dynamic_shading_control_daylight_dimming
+WINDOWS: dict[str, tuple[tuple[str, ...], NDArray[np.float64] | str | None]] = {
     "clear": (("CLEAR_3.DAT",), None),
     "green float": (("913.json",), None),
     "three panes of green float": (("913.json",) * 3, None),
     "electrochromic, clear": (("frads_igsdb_product_7406.json", "CLEAR_3.DAT"), None),
+    "electrochromic at 6 %, clear": (("igsdb_product_7407.json", "CLEAR_3.DAT"), None),
     "blue, coated, and clear": (("nfrc_9962.json", "CLEAR_3.DAT"), None),
     "clear, amber fabric": (("CLEAR_3.DAT",), FABRIC),
+    "red blind, clear": (("CLEAR_3.DAT",), "#b04a3a"),
 }
+BLIND: dict[str, Any] = {"depth_mm": 80.0, "spacing_mm": 72.0, "tilt_deg": 45.0}  # outdoors, flat slats
+BLIND_BEHIND = 0.05  # from the glass to the middle of the slats [m]
+BLIND_BEYOND = 1.0  # slats on each side of the window [m], whose BSDF is that of endless ones
 SKY_AND_GROUND = (
     "skyfunc glow sky_glow 0 0 4 1 1 1 0 sky_glow source sky 0 0 4 0 0 1 180 "
     "skyfunc glow ground_glow 0 0 4 1 1 1 0 ground_glow source ground 0 0 4 0 0 -1 180\n"
@@ -73,13 +84,41 @@ class Window:
     """What fills the window."""
 
     panes: list[SpectralPane]
-    fabric: NDArray[np.float64] | None  # transmittance and reflectance [N], diffuse; None: none
+    fabric: NDArray[np.float64] | None = None  # transmittance and reflectance [N], diffuse; None: none
+    slats: str | None = None  # colour of a blind outdoors, sRGB; None: none
+
+    @staticmethod
+    def of(name: str, data: Path) -> Window:
+        """One of `WINDOWS`."""
+        files, shade = WINDOWS[name]
+        panes = [read_spectral_pane(data / file) for file in files]
+        return Window(panes, slats=shade) if isinstance(shade, str) else Window(panes, shade)
 
     @property
     def factor(self) -> SpectralFactor:
         """Its spectrum by angle."""
+        if self.slats is not None:
+            panes = SpectralFactor.of_panes(self.panes)
+            return replace(panes, mirrored=None, slats=coloured_blind(self.slats)[1])
         shade = () if self.fabric is None else (self.fabric, self.fabric)
         return SpectralFactor.of_panes(self.panes, *shade)
+
+
+@cache
+def coloured_blind(colour: str) -> tuple[KlemsBsdf, SlatLight]:
+    """Visible BSDF of the slats, and their light by wavelength, as `cfs bsdf generate` makes them."""
+    names = ("product", "geometry", "period_mm", "openness", "radius_mm", "index", "solar", "visible")
+    options: dict[str, Any] = {
+        **dict.fromkeys(names),
+        **dict.fromkeys(("thickness_mm", "specular", "roughness", "cull"), 0.0),
+        **{"basis": "full", "tensor_tree": None, "isotropic": False, "paths": 32_768, "seed": 0, "name": ""},
+        **BLIND,
+    }
+    file, _, light = generated_file(sheet_colour=colour, shape="venetian", **options)
+    assert light is not None
+    bsdf = file.bands["Visible"]
+    assert isinstance(bsdf, KlemsBsdf)
+    return bsdf, light
 
 
 @dataclass(frozen=True)
@@ -89,42 +128,76 @@ class Light:
     edi: NDArray[np.float64]
     ratio: NDArray[np.float64]
     kelvin: NDArray[np.float64]
+    uv: NDArray[np.float64]  # [S, 2] CIE 1976 u', v'
 
     @staticmethod
     def of(received: NDArray[np.float64]) -> Light:
         """From what detectors receive [S, 9]."""
-        edi = equivalent_daylight(received[:, 5])
-        return Light(edi, edi / received[:, 0], colour_temperature(received[:, -3:])[0])
+        edi, (x, y, z) = equivalent_daylight(received[:, 5]), received[:, -3:].T
+        uv = np.stack([4 * x, 9 * y], axis=1) / (x + 15 * y + 3 * z)[:, None]
+        return Light(edi, edi / received[:, 0], colour_temperature(received[:, -3:])[0], uv)
 
 
 def main(
     *,
     data: Path = Path("../shared/data/bsdf/products_spectral"),
     bounces: int = 8,
-    divisions: int = 20000,
+    divisions: int = 5000,
+    repeats: int = 4,
     only: str = "",
+    sky: str = "",
     room: str = "neutral",
 ) -> str:
-    """The tables of docs/evidence_daylight.md; only: of one of `WINDOWS`; room: one of `ROOMS`."""
+    """The tables of docs/evidence_daylight.md; only: of one of `WINDOWS`; sky: of one; room: one of `ROOMS`.
+
+    Windows whose files are not in the folder of data are left out.
+    """
     rows = [
-        "| panes | sky | point | EDI [lx] | Radiance | difference % | DER | difference % | CCT, difference [K] |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "| panes | sky | point | EDI [lx] | Radiance | difference % | DER | difference % "
+        "| CCT, difference [K] | [1/MK] | u'v' |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
-    for name, (files, fabric) in WINDOWS.items():
-        if only not in ("", name):
+    for name, (files, _) in WINDOWS.items():
+        if only not in ("", name) or not all((data / file).exists() for file in files):
             continue
-        window = Window([read_spectral_pane(data / file) for file in files], fabric)
-        for sky in ("overcast", "sun"):
-            own, peer = ours(window, sky, room), radiances(window, sky, bounces, divisions, room)
-            for s, point in enumerate(NAMES):
-                edi, ratio = own.edi[s], own.ratio[s]
-                rows.append(
-                    f"| {name} | {sky} | {point} | {edi:.1f} | {peer.edi[s]:.1f} | "
-                    f"{100 * (edi / peer.edi[s] - 1):.1f} | {ratio:.4f} | "
-                    f"{100 * (ratio / peer.ratio[s] - 1):.2f} | "
-                    f"{own.kelvin[s] - peer.kelvin[s]:.0f} |"
-                )
+        window = Window.of(name, data)
+        for kind in ("overcast", "sun"):
+            if sky in ("", kind):
+                own = ours(window, kind, room)
+                peers = radiances(window, kind, bounces, divisions, room, repeats)
+                rows += [f"| {name} | {kind} | {point} | {_compared(own, peers, s)} |" for s, point in enumerate(NAMES)]
     return "\n".join(rows)
+
+
+def _compared(own: Light, peers: Light, s: int) -> str:
+    """Cells of a point s: of the peer the mean of its repeats, with that mean's standard error.
+
+    Args: peers: of the points, repeat after repeat.
+    """
+    edi, ratio, kelvin = (values[s :: len(NAMES)] for values in (peers.edi, peers.ratio, peers.kelvin))
+    apart = float(np.hypot(*(own.uv[s] - peers.uv[s :: len(NAMES)].mean(axis=0))))
+    mired = 1e6 / own.kelvin[s] - (1e6 / kelvin).mean()
+    cells = (
+        f"{own.edi[s]:.1f}",
+        f"{edi.mean():.1f}",
+        _difference(100 * own.edi[s] / edi.mean(), 100 * edi / edi.mean(), 1),
+        f"{own.ratio[s]:.4f}",
+        _difference(100 * own.ratio[s] / ratio.mean(), 100 * ratio / ratio.mean(), 2),
+        _difference(own.kelvin[s], kelvin, 0),
+        f"{mired:+.1f}" if np.isfinite(mired) else "none",
+        f"{apart:.4f}",
+    )
+    return " | ".join(cells)
+
+
+def _difference(own: float, peers: NDArray[np.float64], digits: int) -> str:
+    """A difference from the mean, and the mean's standard error."""
+    if not np.isfinite(own - peers.mean()):
+        return "none"
+    difference = f"{own - peers.mean():+.{digits}f}"
+    if len(peers) == 1:
+        return difference
+    return f"{difference} ± {peers.std(ddof=1) / np.sqrt(len(peers)):.{digits}f}"
 
 
 def room_scene(room: str = "neutral") -> tuple[DaylightScene, NDArray[np.float64]]:
@@ -173,19 +246,25 @@ def photopic_light(window: Window, sky: AnnualSky, scene: DaylightScene) -> Phas
         block = np.full((KLEMS_FULL.size,) * 2, share / np.pi)
         sheet = KlemsBsdf(KLEMS_FULL, KLEMS_FULL, block, block, block, block)
         system = BsdfOptics(combine_layers([specular_matrices(table), sheet]).bsdf)
+    if window.slats is not None:
+        system = BsdfOptics(combine_layers([coloured_blind(window.slats)[0], specular_matrices(table)]).bsdf)
     sampling = Sampling(sensor_samples=1 << 16, patch_samples=1 << 14, sun_points=1 << 13)
     light = daylight(scene, [[system]], sky, sampling=sampling)
     assert isinstance(light, PhaseLight)
     return light
 
 
-def radiances(window: Window, kind: str, bounces: int, divisions: int, room: str) -> Light:
-    """Radiance's: spectra as its own primitives, each pane a `glass`, the fabric a `trans`."""
+def radiances(window: Window, kind: str, bounces: int, divisions: int, room: str, repeats: int = 1) -> Light:
+    """Radiance's: spectra as its own primitives, each pane a `glass`, the fabric a `trans`, slats `plastic`.
+
+    Of the points, repeat after repeat, whose random numbers differ.
+    """
     power = []  # in the bands of the ranges, from blue to red
     with TemporaryDirectory() as name:
         folder = Path(name)
         lines = "".join(" ".join(f"{v:g}" for v in (*p, *n)) + "\n" for p, n in zip(POINTS, NORMALS, strict=True))
-        options = f"-I+ -h -ab {bounces} -aa 0 -ad {divisions} -as 0 -lw 1e-7 -dj 0 -dc 1 -dt 0 -cs {BANDS} -co+"
+        lines *= repeats
+        options = f"-u+ -I+ -h -ab {bounces} -aa 0 -ad {divisions} -as 0 -lw 1e-7 -dj 0 -dc 1 -dt 0 -cs {BANDS} -co+"
         for low, high in ranges():
             peer_scene(folder, window, kind, room, (low, high))
             command = f"rtrace {options} -cw {low:g} {high:g} scene.oct"
@@ -215,7 +294,33 @@ def peer_scene(folder: Path, window: Window, kind: str, room: str, nm: tuple[flo
     made = run(f"gendaylit -ang {ALTITUDE} {azimuth} -W {beam} {diffuse}", folder).decode()
     (folder / "sky.rad").write_text(_sky(made, kind, window.panes), "utf-8")
     (folder / "glass.rad").write_text(_glass(scene, window, *nm, gap), "utf-8")
-    run("oconv sky.rad room.rad glass.rad > scene.oct", folder)
+    (folder / "blind.rad").write_text("" if window.slats is None else _blind(scene, window.slats), "utf-8")
+    run("oconv sky.rad room.rad glass.rad blind.rad > scene.oct", folder)
+
+
+def _blind(scene: DaylightScene, colour: str) -> str:
+    """Slats as `plastic` outdoors, and a black facade, which sends no light to them."""
+    corners = np.concatenate([each.triangles for each in scene.groups[0].windows]).reshape(-1, 3)
+    (left, front, low), (right, _, high) = corners.min(axis=0), corners.max(axis=0)
+    west, east, bottom, top = left - BLIND_BEYOND, right + BLIND_BEYOND, low - BLIND_BEYOND, high + BLIND_BEYOND
+    parts = [_spectrum("paint", reflectance_of_code(colour)), "paint plastic slat\n0\n0\n5 1 1 1 0 0\n"]
+    parts.append("void plastic black\n0\n0\n5 0 0 0 0 0\n")
+    sides = [
+        (west, bottom, left, top),
+        (right, bottom, east, top),
+        (left, bottom, right, low),
+        (left, high, right, top),
+    ]
+    for i, (a, b, c, d) in enumerate(sides):
+        y = front - 10 * GAP
+        parts.append(polygon("black", f"facade{i}", np.array([[a, y, b], [c, y, b], [c, y, d], [a, y, d]])))
+    depth, step = BLIND["depth_mm"] / 1000, BLIND["spacing_mm"] / 1000
+    tilt, y = np.radians(BLIND["tilt_deg"]), front - BLIND_BEHIND
+    dy, dz = 0.5 * depth * np.cos(tilt), 0.5 * depth * np.sin(tilt)
+    for i, z in enumerate(np.arange(bottom, top, step)):
+        ends = [[west, y - dy, z - dz], [east, y - dy, z - dz], [east, y + dy, z + dz], [west, y + dy, z + dz]]
+        parts.append(polygon("slat", f"slat{i}", np.array(ends)))
+    return "\n".join(parts)
 
 
 def _surfaces(surfaces: Surfaces, reflectance: NDArray[np.float64]) -> str:

@@ -42,7 +42,7 @@ def main(
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for name, files in PANES.items():
-        window = Window([read_spectral_pane(data / file) for file in files], None)
+        window = Window([read_spectral_pane(data / file) for file in files])
         rays, sampled, own = _lights(window, divisions, gap)
         for s, point in enumerate(NAMES):
             differences = (

@@ -14,7 +14,7 @@ from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.periodic import PeriodicLayer, SlatMaterial
 from mitsuba_cfs.bsdf.screens import woven_screen
 from mitsuba_cfs.bsdf.xml import BsdfFile, write_bsdf_xml
-from scenes.demo.make_blind import (
+from tests.demo.make_blind import (
     BEFORE_BLIND,
     BLIND,
     BLIND_TOTAL,

@@ -1,6 +1,6 @@
 """An exterior blind at several slat tilts before the demo's glazing, as BSDF files of a family.
 
-Slats and panes are those of `scenes.demo.make_blind`; each tilt is traced by this project's virtual
+Slats and panes are those of `tests.demo.make_blind`; each tilt is traced by this project's virtual
 goniophotometer.
 """
 
@@ -18,7 +18,7 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.layers import combine_layers
 from mitsuba_cfs.bsdf.xml import BsdfFile, write_bsdf_xml
 from scenes.demo import VENETIAN_BLIND
-from scenes.demo.make_blind import BEAM, BEFORE_BLIND, BLIND, BLIND_TOTAL, PANES, thermal_values
+from tests.demo.make_blind import BEAM, BEFORE_BLIND, BLIND, BLIND_TOTAL, PANES, thermal_values
 
 GLAZING = Path(VENETIAN_BLIND).with_name("glazing.xml")
 WIDTH, SPACING, RADIUS = 0.080, 0.072, 0.104  # [m]

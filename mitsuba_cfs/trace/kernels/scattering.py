@@ -123,7 +123,7 @@ class KlemsScattering:
         self._values = mi.Float(np.ascontiguousarray(scattered, dtype=np.float32).ravel())
         self._through = PatchBeam(basis, through, exponent)
         self.basis, self.beams = basis, np.asarray(through, dtype=float)  # [K] as the data have it
-        self.key = ("klems", basis, np.asarray(scattered), np.asarray(through), exponent or -1.0)
+        self.key: object = ("klems", basis, np.asarray(scattered), np.asarray(through), exponent or -1.0)
 
     def scattered(self, sun: mi.Vector3f, outward: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""

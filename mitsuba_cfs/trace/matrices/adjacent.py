@@ -23,7 +23,8 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import SurfaceGroups, Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
 from mitsuba_cfs.trace.kernels.bounce_counts import BounceCounts
-from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.kernels.path_options import PathOptions
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
 from mitsuba_cfs.trace.kernels.rooms import surface_counts
 from mitsuba_cfs.trace.kernels.sampling import (
@@ -99,7 +100,6 @@ def absorption_matrix(
     seed: int = 0,
     progress: Progress = silent,
     cache: MatrixCache | None = None,
-    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Absorption matrices [G, K, F + G]: where a unit of flux of each window patch is absorbed.
 
@@ -117,54 +117,25 @@ def absorption_matrix(
         samples: paths for each window patch in each batch.
         cache: of traced matrices, `MatrixCache.of_user()`; none by default.
     """
-    scenes = SceneCache() if scenes is None else scenes
+    paths = PathOptions(int(samples), max_depth, stopping, seed, progress, cache)
     reflectance = np.zeros(len(groups)) if window_reflectance is None else window_reflectance
     reflectance = np.asarray(reflectance, dtype=float)
-    tracer = scenes.scene(surfaces, groups, window_reflectance=reflectance)
-    bins = DirectionBins(basis)
-    n = int(samples)
+    tracer = paths.scenes.scene(surfaces, groups, window_reflectance=reflectance)
     width = tracer.surface_count + len(groups)
 
-    def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
-        normal = tracer.exterior_normal(paths.group)
-        position = mi.Point3f(paths.position - normal * tracer.epsilon)
+    def follow(matrix: mi.Float64, of: WindowPaths) -> None:
+        normal = tracer.exterior_normal(of.group)
+        position = mi.Point3f(of.position - normal * tracer.epsilon)
         depth = dr.opaque(mi.UInt32, max_depth)
-        starts = PathStarts(paths.row, position, -paths.outward, paths.generator, depth, mi.Bool(True))
+        starts = PathStarts(of.row, position, -of.outward, of.generator, depth, mi.Bool(True))
         _absorption_kernel(tracer, matrix, starts)
 
-    return accumulate(
-        window_batches(tracer, bins, width, n, seed, follow, stopping=stopping or Stopping()),
-        stopping=stopping,
-        label="absorption matrix",
-        progress=progress,
-        entry=cache_entry(
-            cache,
-            "absorption matrix",
-            surfaces,
-            groups,
-            reflectance,
-            basis,
-            n,
-            max_depth,
-            seed,
-            by=__name__,
-            stopping=stopping,
-        ),
-    )
+    batch = window_batches(tracer, DirectionBins(basis), width, samples, seed, follow, stopping=stopping or Stopping())
+    return paths.estimate("absorption matrix", batch, surfaces, groups, reflectance, basis, by=__name__)
 
 
 def window_exchange(
-    surfaces: Surfaces,
-    groups: Sequence[WindowGroup],
-    *,
-    basis: KlemsBasis = KLEMS_FULL,
-    samples: int = 128,
-    max_depth: int = 32,
-    stopping: Stopping | None = None,
-    seed: int = 0,
-    by_groups: SurfaceGroups | None = None,
-    cache: MatrixCache | None = None,
-    scenes: SceneCache | None = None,
+    surfaces: Surfaces, groups: Sequence[WindowGroup], paths: PathOptions, *, by_groups: SurfaceGroups | None = None
 ) -> Estimate:
     """Radiance that meets the windows from the room, per unit radiance of a patch [G, K, G * K].
 
@@ -175,83 +146,48 @@ def window_exchange(
 
     Args:
         surfaces: what the room is made of, in the band of the radiances.
-        samples: paths for each patch in each batch.
         by_groups: of the surfaces; W is followed by its derivatives by ln(rho) of these, in the last axis
             [G, K, (1 + N) * G * K].
     """
-    scenes = SceneCache() if scenes is None else scenes
-    tracer, bins, n = scenes.scene(surfaces, groups), DirectionBins(basis), int(samples)
+    tracer, bins = paths.scenes.scene(surfaces, groups), DirectionBins(KLEMS_FULL)
     width = len(groups) * bins.size
     layers = 1 if by_groups is None else 1 + len(by_groups.names)
     columns = layers * width
     bounces = None if by_groups is None else BounceCounts([by_groups], surface_counts([surfaces]), width)
 
-    def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
-        normal = tracer.exterior_normal(paths.group)
+    def follow(matrix: mi.Float64, of: WindowPaths) -> None:
+        normal = tracer.exterior_normal(of.group)
         add_seen_and_reflected(
             tracer,
             bins,
             matrix,
-            mi.Point3f(paths.position - normal * tracer.epsilon),
-            paths.inward(tracer),
+            mi.Point3f(of.position - normal * tracer.epsilon),
+            of.inward(tracer),
             mi.Bool(True),
-            row=paths.row,
+            row=of.row,
             beta=mi.Float(1),
             layers=layers,
-            stream=paths.stream,
-            sample=paths.sample,
-            generator=paths.generator,
-            max_depth=dr.opaque(mi.UInt32, max_depth),
+            stream=of.stream,
+            sample=of.sample,
+            generator=of.generator,
+            max_depth=dr.opaque(mi.UInt32, paths.max_depth),
             bounces=bounces,
         )
 
-    return accumulate(
-        window_batches(tracer, bins, columns, n, seed, follow, stopping=stopping or Stopping()),
-        stopping=stopping,
-        label="window exchange",
-        entry=cache_entry(
-            cache,
-            "window exchange",
-            surfaces,
-            groups,
-            basis,
-            n,
-            max_depth,
-            seed,
-            *(() if by_groups is None else (by_groups.number,)),
-            by=__name__,
-            stopping=stopping,
-        ),
-    )
+    stopping = paths.stopping or Stopping()
+    batch = window_batches(tracer, bins, columns, paths.samples, paths.seed, follow, stopping=stopping)
+    by_number = () if by_groups is None else (by_groups.number,)
+    return paths.estimate("window exchange", batch, surfaces, groups, *by_number, by=__name__)
 
 
-def outdoor_exchange(
-    surfaces: Surfaces,
-    groups: Sequence[WindowGroup],
-    *,
-    samples: int = 128,
-    max_depth: int = 16,
-    stopping: Stopping | None = None,
-    seed: int = 0,
-    cache: MatrixCache | None = None,
-    scenes: SceneCache | None = None,
-) -> Estimate:
+def outdoor_exchange(surfaces: Surfaces, groups: Sequence[WindowGroup], paths: PathOptions) -> Estimate:
     """Radiance that meets the windows from outdoors, per unit that they send there [G, K, G * K].
 
         I[g, k] = sum over g', k' of X[g, k, g' k'] L[g', k']
 
     for incident and outgoing patches of the front; arguments as for `window_exchange`.
     """
-    exchange = window_exchange(
-        surfaces,
-        [_turned(group) for group in groups],
-        samples=samples,
-        max_depth=max_depth,
-        stopping=stopping,
-        seed=seed,
-        cache=cache,
-        scenes=scenes,
-    )
+    exchange = window_exchange(surfaces, [_turned(group) for group in groups], paths)
     theta, phi = KLEMS_FULL.centres()
     patch = KLEMS_FULL.index(theta, np.pi - phi)  # x of the turned windows is that of the others, -
     columns = (np.arange(len(groups))[:, None] * KLEMS_FULL.size + patch).ravel()
@@ -274,14 +210,7 @@ def adjacent_daylight(
     groups: Sequence[WindowGroup],
     luminance: NDArray[np.float64],
     inner: Sequence[WindowGroup],
-    *,
-    basis: KlemsBasis = KLEMS_FULL,
-    samples: int = 512,
-    max_depth: int = 32,
-    stopping: Stopping | None = None,
-    seed: int = 0,
-    cache: MatrixCache | None = None,
-    scenes: SceneCache | None = None,
+    paths: PathOptions,
 ) -> Estimate:
     """Daylight matrices [I, K, P] of glass to an adjacent room: radiance per unit sky radiance.
 
@@ -295,49 +224,30 @@ def adjacent_daylight(
         groups: its windows, black to light from the room.
         luminance: T D of these windows [G, K, P], towards the adjacent room.
         inner: the glass, with normals into the adjacent room.
-        samples: paths of a patch of each piece of glass in each batch.
     """
-    scenes = SceneCache() if scenes is None else scenes
-    tracer, bins, n = scenes.scene(surfaces, groups), DirectionBins(basis), int(samples)
-    starts = scenes.scene(Surfaces.none(), inner, windows_block=False, centre=tracer.centre)
+    tracer, bins = paths.scenes.scene(surfaces, groups), DirectionBins(KLEMS_FULL)
+    starts = paths.scenes.scene(Surfaces.none(), inner, windows_block=False, centre=tracer.centre)
     flat = luminance.reshape(-1, luminance.shape[-1])
 
-    def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
+    def follow(matrix: mi.Float64, of: WindowPaths) -> None:
         add_seen_and_reflected(
             tracer,
             bins,
             matrix,
-            mi.Point3f(paths.position + starts.exterior_normal(paths.group) * tracer.epsilon),
-            paths.outward,
+            mi.Point3f(of.position + starts.exterior_normal(of.group) * tracer.epsilon),
+            of.outward,
             mi.Bool(True),
-            row=paths.row,
+            row=of.row,
             beta=mi.Float(1),
-            stream=paths.stream,
-            sample=paths.sample,
-            generator=paths.generator,
-            max_depth=dr.opaque(mi.UInt32, max_depth),
+            stream=of.stream,
+            sample=of.sample,
+            generator=of.generator,
+            max_depth=dr.opaque(mi.UInt32, paths.max_depth),
         )
 
-    view = window_batches(starts, bins, len(flat), n, seed, follow)
-    return accumulate(
-        lambda number: view(number) @ flat,
-        stopping=stopping,
-        label="adjacent daylight",
-        entry=cache_entry(
-            cache,
-            "adjacent daylight",
-            surfaces,
-            groups,
-            flat,
-            inner,
-            basis,
-            n,
-            max_depth,
-            seed,
-            by=__name__,
-            stopping=stopping,
-        ),
-    )
+    view = window_batches(starts, bins, len(flat), paths.samples, paths.seed, follow)
+    inputs = surfaces, groups, flat, inner
+    return paths.estimate("adjacent daylight", lambda number: view(number) @ flat, *inputs, by=__name__)
 
 
 Room = tuple[Surfaces, Sequence[WindowGroup]]
@@ -378,13 +288,7 @@ def adjacent_view(
     beam: NDArray[np.float64],
     beyond: AdjacentRoomLight,
     sensors: tuple[ArrayLike, ArrayLike],
-    *,
-    samples: int = 4096,
-    max_depth: int = 32,
-    stopping: Stopping | None = None,
-    seed: int = 0,
-    cache: MatrixCache | None = None,
-    scenes: SceneCache | None = None,
+    paths: PathOptions,
 ) -> Estimate:
     """Irradiance at sensors straight through a window group [S, P], per unit sky radiance.
 
@@ -397,18 +301,16 @@ def adjacent_view(
         beam: [K] transmittance of the straight beam of the group.
         beyond: the adjacent room.
         sensors: positions [S, 3] [m] and normals [S, 3].
-        samples: paths of a sensor in each batch.
     """
-    scenes = SceneCache() if scenes is None else scenes
     points, directions = sensors_of(*sensors)
-    here, bins, n, S = scenes.scene(*room), DirectionBins(KLEMS_FULL), int(samples), len(points)
+    here, bins, n, S = paths.scenes.scene(*room), DirectionBins(KLEMS_FULL), paths.samples, len(points)
     flat = [one.luminance.reshape(-1, one.luminance.shape[-1]) for one in beyond.rooms()]
     place, normal = vectors(points - here.centre, mi.Point3f), vectors(directions)
     passed = mi.Float(np.asarray(beam, dtype=np.float32))
 
     def batch(number: int) -> NDArray[np.float64]:
         sums = [empty_sums(S * len(one)) for one in flat]
-        count, key = dr.opaque(mi.UInt32, n), batch_key(seed, number)
+        count, key = dr.opaque(mi.UInt32, n), batch_key(paths.seed, number)
         path = dr.arange(mi.UInt32, S * n)
         sensor = path // count
         sample, stream = path - sensor * count, mi.sample_tea_32(sensor, key)[0]
@@ -428,38 +330,20 @@ def adjacent_view(
             start,
             mi.Vector3f(away),
             active,
-            scenes=scenes,
+            scenes=paths.scenes,
             centre=here.centre,
             row=sensor,
             stream=stream,
             sample=sample,
             generator=generator,
-            max_depth=dr.opaque(mi.UInt32, max_depth),
+            max_depth=dr.opaque(mi.UInt32, paths.max_depth),
         )
         dr.eval(*sums)
         each = zip(sums, flat, strict=True)
         return sum(sums_of(one, (S, len(light))) @ light for one, light in each) * (np.pi / n)
 
-    return accumulate(
-        batch,
-        stopping=stopping,
-        label="adjacent view",
-        entry=cache_entry(
-            cache,
-            "adjacent view",
-            room,
-            group,
-            beam,
-            beyond,
-            points,
-            directions,
-            n,
-            max_depth,
-            seed,
-            by=__name__,
-            stopping=stopping,
-        ),
-    )
+    inputs = room, group, beam, beyond, points, directions
+    return paths.estimate("adjacent view", batch, *inputs, by=__name__)
 
 
 def _add_paths(

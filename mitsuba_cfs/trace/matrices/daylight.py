@@ -22,7 +22,8 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
-from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.kernels.path_options import PathOptions
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts, roulette
 from mitsuba_cfs.trace.kernels.rooms import TracedRoom, of_rooms
 from mitsuba_cfs.trace.kernels.sampling import (
@@ -35,88 +36,35 @@ from mitsuba_cfs.trace.kernels.sampling import (
     sums_of,
     vectors,
 )
-from mitsuba_cfs.trace.kernels.scene import SceneCache, TracedScene
+from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
 from mitsuba_cfs.window_parts import Cells
 
 BATCHES = 2
 
 
-def cell_daylight(
-    surfaces: Surfaces,
-    groups: Sequence[WindowGroup],
-    cells: Sequence[Cells],
-    *,
-    subdivision: int = 1,
-    basis: KlemsBasis = KLEMS_FULL,
-    samples: int = 8,
-    max_depth: int = 16,
-    seed: int = 0,
-    cache: MatrixCache | None = None,
-    scenes: SceneCache | None = None,
-) -> list[NDArray[np.float64]]:
-    """Daylight matrices [C, K, P] of the cells of each window group, as `daylight_matrix`.
-
-    Every cell sends out the same directions with the same random numbers: what two cells see alike
-    is alike to the last digit, and their difference has far less noise than either.
-
-    Args: samples: paths of each cell and patch in each of 2 batches.
-    """
-    room = TracedRoom(surfaces, tuple(groups))
-    (estimate,) = cells_of_rooms(
-        [room],
-        None,
-        [cells],
-        [samples],
-        subdivision=subdivision,
-        basis=basis,
-        max_depth=max_depth,
-        seed=seed,
-        cache=cache,
-        scenes=scenes,
-    )
-    return estimate
-
-
 def cells_of_rooms(
     rooms: Sequence[TracedRoom],
     outdoors: SharedOutdoors | None,
     cells: Sequence[Sequence[Cells]],
-    samples: Sequence[int],
-    *,
-    subdivision: int = 1,
-    basis: KlemsBasis = KLEMS_FULL,
-    max_depth: int = 16,
-    seed: int = 0,
-    cache: MatrixCache | None = None,
-    scenes: SceneCache | None = None,
+    paths: Sequence[PathOptions],
 ) -> list[list[NDArray[np.float64]]]:
-    """`cell_daylight` of several rooms of a building, traced together.
+    """Daylight matrices [C, K, P] of the cells of each window group, as `daylight_matrix`, of rooms traced together.
+
+    Every cell sends out the same directions with the same random numbers: what two cells see alike
+    is alike to the last digit, and their difference has far less noise than either.
 
     Args:
         rooms, outdoors: as of `daylight_of_rooms`.
-        cells: of each group of each room; samples: of each room.
+        cells: of each group of each room.
+        paths: of each room, which differ in their number alone, in each of 2 batches.
     """
-    scenes = SceneCache() if scenes is None else scenes
-    bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
+    scenes, max_depth, seed = paths[0].scenes, paths[0].max_depth, paths[0].seed
+    bins, sky = DirectionBins(KLEMS_FULL), SkyBins(ReinhartSky(1))
     places = [list(_places(room.groups, of, np.zeros(3))) for room, of in zip(rooms, cells, strict=True)]
     entries = [
-        None
-        if cache is None
-        else cache.entry(
-            "cell daylight",
-            mi.variant(),
-            room.surfaces,
-            room.groups,
-            *place[1:],
-            subdivision,
-            basis,
-            n,
-            max_depth,
-            seed,
-            by=__name__,
-        )
-        for room, place, n in zip(rooms, places, samples, strict=True)
+        of.entry("cell daylight", room.surfaces, room.groups, *place[1:], by=__name__)
+        for room, place, of in zip(rooms, places, paths, strict=True)
     ]
 
     def traced(some: Sequence[int]) -> Callable[[int], NDArray[np.float64]]:
@@ -124,13 +72,13 @@ def cells_of_rooms(
             tracer = scenes.scene(rooms[0].surfaces, rooms[0].groups)
         else:
             tracer = scenes.outdoors(outdoors, [rooms[i] for i in some])
-        paths = np.array([samples[i] for i in some])
+        samples = np.array([paths[i].samples for i in some])
         counts = np.array([len(places[i][0]) for i in some])
         joined = (np.concatenate([places[i][part] for i in some]) for part in range(4))
         frames, corner, *sides = joined
         tables = [vectors(v) for v in (corner - tracer.centre, *sides)]
         axes = [vectors(frames[:, i]) for i in range(3)]
-        return _batches(tracer, bins, sky, tables, axes, counts=counts, samples=paths, max_depth=max_depth, seed=seed)
+        return _batches(tracer, bins, sky, tables, axes, counts=counts, samples=samples, max_depth=max_depth, seed=seed)
 
     stored = (None if entry is None else entry.read(_stored) for entry in entries)
     values = [one for one in stored if one is not None]
@@ -313,7 +261,6 @@ def daylight_matrix(
     seed: int = 0,
     progress: Progress = silent,
     cache: MatrixCache | None = None,
-    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Daylight matrices [G, K, P]: mean radiance of each window patch per unit sky radiance.
 
@@ -334,35 +281,18 @@ def daylight_matrix(
     Source: Ward, Mistrick, Lee, McNeil, Jonsson 2011, LEUKOS 7:241-261 (three-phase method).
     """
     room = TracedRoom(surfaces, tuple(groups))
-    (estimate,) = daylight_of_rooms(
-        [room],
-        None,
-        subdivision=subdivision,
-        basis=basis,
-        samples=samples,
-        max_depth=max_depth,
-        stopping=stopping,
-        seed=seed,
-        progress=progress,
-        cache=cache,
-        scenes=scenes,
-    )
+    paths = PathOptions(int(samples), max_depth, stopping, seed, progress, cache)
+    (estimate,) = daylight_of_rooms([room], None, paths, subdivision=subdivision, basis=basis)
     return estimate
 
 
 def daylight_of_rooms(
     rooms: Sequence[TracedRoom],
     outdoors: SharedOutdoors | None,
+    paths: PathOptions,
     *,
     subdivision: int = 4,
     basis: KlemsBasis = KLEMS_FULL,
-    samples: int = 4096,
-    max_depth: int = 16,
-    stopping: Stopping | None = None,
-    seed: int = 0,
-    progress: Progress = silent,
-    cache: MatrixCache | None = None,
-    scenes: SceneCache | None = None,
 ) -> list[Estimate]:
     """`daylight_matrix` of several rooms of a building, traced together.
 
@@ -372,24 +302,10 @@ def daylight_of_rooms(
         rooms: their surfaces are what is in front of the windows of each.
         outdoors: the same of all rooms; None for a single room.
     """
-    scenes, n = SceneCache() if scenes is None else scenes, int(samples)
+    scenes, seed, stopping = paths.scenes, paths.seed, paths.stopping
     bins, sky = DirectionBins(basis), SkyBins(ReinhartSky(subdivision))
-    entries = [
-        cache_entry(
-            cache,
-            "daylight matrix",
-            room.surfaces,
-            room.groups,
-            subdivision,
-            basis,
-            n,
-            max_depth,
-            seed,
-            by=__name__,
-            stopping=stopping,
-        )
-        for room in rooms
-    ]
+    label = "daylight matrix"
+    entries = [paths.entry(label, one.surfaces, one.groups, subdivision, basis, by=__name__) for one in rooms]
 
     def traced(some: Sequence[int]) -> Callable[[int], NDArray[np.float64]]:
         something = outdoors is not None or len(rooms[0].surfaces.triangles) > 0
@@ -398,16 +314,16 @@ def daylight_of_rooms(
         else:
             tracer = scenes.outdoors(outdoors, [rooms[i] for i in some])
 
-        def follow(matrix: mi.Float64, paths: WindowPaths) -> None:
-            depth = dr.opaque(mi.UInt32, max_depth)
+        def follow(matrix: mi.Float64, of: WindowPaths) -> None:
+            depth = dr.opaque(mi.UInt32, paths.max_depth)
             # light comes back to the windows where there is something
-            clear = tracer.exterior_normal(paths.group) * tracer.epsilon if something else 0.0
-            place = mi.Point3f(paths.position + clear)
-            starts = PathStarts(paths.row, place, paths.outward, paths.generator, depth, mi.Bool(True))
-            here = tracer.of_lanes(tracer.group_in_room(paths.group)[0])
+            clear = tracer.exterior_normal(of.group) * tracer.epsilon if something else 0.0
+            place = mi.Point3f(of.position + clear)
+            starts = PathStarts(of.row, place, of.outward, of.generator, depth, mi.Bool(True))
+            here = tracer.of_lanes(tracer.group_in_room(of.group)[0])
             add_daylight_paths(here, sky, matrix, starts)
 
-        batch = window_batches(tracer, bins, sky.size, n, seed, follow, stopping=stopping or Stopping())
+        batch = window_batches(tracer, bins, sky.size, paths.samples, seed, follow, stopping=stopping or Stopping())
         return lambda number: batch(number).reshape(-1, sky.size)
 
     return of_rooms(
@@ -416,8 +332,8 @@ def daylight_of_rooms(
         entries,
         shapes=[(len(room.groups), bins.size, sky.size) for room in rooms],
         stopping=stopping,
-        label="daylight matrix",
-        progress=progress,
+        label=label,
+        progress=paths.progress,
         outdoors=True,
     )
 
@@ -484,23 +400,7 @@ def sky_irradiance_matrix(
         add_daylight_paths(tracer, sky, matrix, starts)
         return sums_of(matrix, (S, P)) * (accepted.total / n)
 
-    return accumulate(
-        batch,
-        stopping=stopping,
-        label="sky irradiance",
-        progress=progress,
-        entry=cache_entry(
-            cache,
-            "sky irradiance",
-            surfaces,
-            points,
-            directions,
-            subdivision,
-            () if acceptance is None else np.asarray(acceptance, dtype=float),
-            n,
-            max_depth,
-            seed,
-            by=__name__,
-            stopping=stopping,
-        ),
-    )
+    by_angle = () if acceptance is None else np.asarray(acceptance, dtype=float)
+    paths = PathOptions(int(samples), max_depth, stopping, seed, progress, cache)
+    inputs = surfaces, points, directions, subdivision, by_angle
+    return paths.estimate("sky irradiance", batch, *inputs, by=__name__)

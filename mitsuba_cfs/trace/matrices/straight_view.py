@@ -24,6 +24,7 @@ from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, even_numbers, points_on_triangles
 from mitsuba_cfs.trace.kernels.bins import SkyBins
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
+from mitsuba_cfs.trace.kernels.path_options import PathOptions
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts, roulette
 from mitsuba_cfs.trace.kernels.sampling import (
     batch_key,
@@ -196,13 +197,8 @@ def straight_view_matrix(
     points: ArrayLike,
     directions: ArrayLike,
     *,
+    paths: PathOptions,
     subdivision: int = 4,
-    samples: int = 1024,
-    max_depth: int = 16,
-    stopping: Stopping | None = None,
-    seed: int = 0,
-    cache: MatrixCache | None = None,
-    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Illuminance at each sensor per unit luminance of each sky patch [G, S, P] [sr, projected].
 
@@ -213,13 +209,11 @@ def straight_view_matrix(
 
     Args:
         scattering: of each group's system; None leaves a group out.
-        samples: points on each group for each sensor in each batch.
-        max_depth: 1 for direct sky light only.
+        paths: from points on each group to each sensor; a depth of 1 for direct sky light only.
     """
-    scenes = SceneCache() if scenes is None else scenes
     points, directions = sensors_of(points, directions)
-    inside, outside = scenes.scene(interior, groups), scenes.scene(exterior, groups)
-    sky, S, n = SkyBins(ReinhartSky(subdivision)), len(points), int(samples)
+    inside, outside = (paths.scenes.scene(surfaces, groups) for surfaces in (interior, exterior))
+    sky, S, n = SkyBins(ReinhartSky(subdivision)), len(points), paths.samples
 
     def one_group(g: int, way: Scattering, key: mi.UInt32) -> NDArray[np.float64]:
         matrix = empty_sums(S * sky.size)
@@ -230,39 +224,20 @@ def straight_view_matrix(
             start,
             omega,
             path_generator(dr.arange(mi.UInt32, S * n), key),
-            dr.opaque(mi.UInt32, max_depth),
+            dr.opaque(mi.UInt32, paths.max_depth),
             weight > 0,
         )
         add_daylight_paths(outside, sky, matrix, starts, weight)
         return sums_of(matrix, (S, sky.size)) / n
 
     def batch(number: int) -> NDArray[np.float64]:
-        key = batch_key(seed, number)
+        key = batch_key(paths.seed, number)
         nothing = np.zeros((S, sky.size))
         return np.stack([nothing if way is None else one_group(g, way, key) for g, way in enumerate(scattering)])
 
     keys = [None if way is None else way.key for way in scattering]
-    return accumulate(
-        batch,
-        stopping=stopping,
-        label="straight view",
-        entry=cache_entry(
-            cache,
-            "straight view",
-            interior,
-            exterior,
-            groups,
-            keys,
-            points,
-            directions,
-            subdivision,
-            n,
-            max_depth,
-            seed,
-            by=__name__,
-            stopping=stopping,
-        ),
-    )
+    inputs = interior, exterior, groups, keys, points, directions, subdivision
+    return paths.estimate("straight view", batch, *inputs, by=__name__)
 
 
 def straight_rays(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import drjit as dr
@@ -24,7 +24,8 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.surfaces import SurfaceGroups, Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
 from mitsuba_cfs.trace.kernels.bounce_counts import MOST_BOUNCES, BounceCounts
-from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, cache_entry
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.kernels.path_options import PathOptions
 from mitsuba_cfs.trace.kernels.rooms import TracedRoom, of_rooms, surface_counts
 from mitsuba_cfs.trace.kernels.sampling import (
     Ranges,
@@ -36,7 +37,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     sums_of,
     vectors,
 )
-from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
+from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.kernels.view_paths import add_mirrored, add_view_paths
 
 MOST_SENSORS = 64  # that share hits; more cost more than they save
@@ -489,7 +490,6 @@ def view_matrix(
     seed: int = 0,
     progress: Progress = silent,
     cache: MatrixCache | None = None,
-    scenes: SceneCache | None = None,
 ) -> Estimate:
     """View matrices [S, G, K]: irradiance at each sensor per unit radiance of a window patch.
 
@@ -512,15 +512,7 @@ def view_matrix(
     """
     room = TracedRoom(surfaces, tuple(groups), *sensors_of(points, directions))
     (views,) = views_of_rooms(
-        [room],
-        basis=basis,
-        samples=samples,
-        max_depth=max_depth,
-        stopping=stopping,
-        seed=seed,
-        progress=progress,
-        cache=cache,
-        scenes=scenes,
+        [room], PathOptions(int(samples), max_depth, stopping, seed, progress, cache), basis=basis
     )
     return views.whole
 
@@ -535,18 +527,12 @@ class RoomViews(NamedTuple):
 
 def views_of_rooms(
     rooms: Sequence[TracedRoom],
+    paths: PathOptions,
     *,
     with_direct: bool = False,
     direct: NDArray[np.float64] | None = None,
     by_groups: Sequence[SurfaceGroups] = (),
     basis: KlemsBasis = KLEMS_FULL,
-    samples: int = 4096,
-    max_depth: int = 32,
-    stopping: Stopping | None = None,
-    seed: int = 0,
-    progress: Progress = silent,
-    cache: MatrixCache | None = None,
-    scenes: SceneCache | None = None,
 ) -> list[RoomViews]:
     """`view_matrix` of several rooms, traced together, and their direct parts from the same rays.
 
@@ -559,7 +545,7 @@ def views_of_rooms(
         by_groups: of the surfaces of each room, as many in each: derivatives by their reflectances, from
             the same paths; none by default.
     """
-    n, scenes = int(samples), SceneCache() if scenes is None else scenes
+    max_depth = paths.max_depth
     bins, depths = DirectionBins(basis), (max_depth, 1) if with_direct else (max_depth,)
     if by_groups and max_depth > MOST_BOUNCES:
         raise ValueError(f"max_depth: at most {MOST_BOUNCES} with derivatives, got {max_depth}")
@@ -567,38 +553,33 @@ def views_of_rooms(
     derived = [(f"view matrix by reflectance {i}", max_depth) for i in range(groups)]
     layers = [*(("view matrix", depth) for depth in depths), *derived]
     entries = [
-        cache_entry(
-            cache,
+        replace(paths, max_depth=depth).entry(
             label,
             room.surfaces,
             room.groups,
             room.points,
             room.directions,
             basis,
-            n,
-            depth,
-            seed,
             *(() if label == "view matrix" else (by_groups[number].number,)),
             by=__name__,
-            stopping=stopping,
         )
         for label, depth in layers
         for number, room in enumerate(rooms)
     ]
 
     def traced(some: Sequence[int]) -> Callable[[int], NDArray[np.float64]]:
-        placed, tracer = scenes.together([rooms[i] for i in some])
+        placed, tracer = paths.scenes.together([rooms[i] for i in some])
         of = _Sensors.of(tracer, bins, placed, [by_groups[i] for i in some] if by_groups else ())
-        return _batches(of, n, depths, seed, direct)
+        return _batches(of, paths.samples, depths, paths.seed, direct)
 
     estimates = of_rooms(
         rooms,
         traced,
         entries,
         shapes=[(len(room.points), len(room.groups), bins.size) for room in rooms],
-        stopping=stopping,
+        stopping=paths.stopping,
         label="view matrix",
-        progress=progress,
+        progress=paths.progress,
         layers=len(layers),
     )
     of_layers = [estimates[i : i + len(rooms)] for i in range(0, len(estimates), len(rooms))]

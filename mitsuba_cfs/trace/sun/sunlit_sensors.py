@@ -70,24 +70,6 @@ def room_cells(inside: TracedScene, *, samples: int = CELL_RAYS * CELL_SHARE) ->
     return narrow, ReflectingCells(wide, holder, points.places.some(chosen + shift[chosen]))
 
 
-def room_shares(
-    cells: tuple[RoomCells, ReflectingCells],
-    inside: TracedScene,
-    sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
-    *,
-    samples: int,
-    seed: int = 0,
-) -> NDArray[np.float64]:
-    """Illuminance of sensors by reflection of a unit luminous flux on each cell [S, c] [1/m2].
-
-    Args:
-        sensors: positions and normals [S, 3].
-        samples: rays of each sensor.
-    """
-    (shares,) = shares_and_derivatives(cells, inside, sensors, samples=samples, seed=seed)
-    return shares
-
-
 def shares_and_derivatives(
     cells: tuple[RoomCells, ReflectingCells],
     inside: TracedScene,
@@ -97,7 +79,9 @@ def shares_and_derivatives(
     seed: int = 0,
     by_groups: SurfaceGroups | None = None,
 ) -> NDArray[np.float64]:
-    """`room_shares`, then its derivatives by ln(rho) of groups of surfaces [1 + N, S, c].
+    """Illuminance of sensors by reflection of a unit luminous flux on each cell [1 + N, S, c] [1/m2].
+
+    The first matrix, then its derivatives by ln(rho) of groups of surfaces.
 
     W' = A' + (A' + A' F + ...) F + (A + A F + ...) F'
     """

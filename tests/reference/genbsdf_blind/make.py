@@ -10,8 +10,9 @@ import numpy as np
 from pyradiance import genbsdf
 
 from mitsuba_cfs.bsdf.blinds import venetian_blind
-from mitsuba_cfs.bsdf.periodic import plastic, write_radiance
+from mitsuba_cfs.bsdf.periodic import plastic
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml, write_bsdf_xml
+from tests.bsdf.radiance_cells import write_radiance
 
 SPACING, ROWS = 0.072, 101
 MATERIAL = plastic("grey", 0.55, specular=0.01, roughness=0.06)

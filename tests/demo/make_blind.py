@@ -2,7 +2,7 @@
 
 Each is an XML file with a `.toml` beside it: `glazing`, `venetian_blind`.
 
-    python -m scenes.demo.make_blind
+    python -m tests.demo.make_blind
 
 The blind is that of the dissertation: slats 80 mm deep, of 104 mm radius, 72 mm apart, 55 % grey
 with 1 % gloss of roughness 0.06, here at 45 degrees; its BSDF is traced by this project's virtual
@@ -11,8 +11,6 @@ the third surface; its values at normal incidence are those usual for such panes
 """
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 
@@ -23,8 +21,8 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.bsdf.layers import LayeredSystem, combine_layers
 from mitsuba_cfs.bsdf.periodic import plastic
 from mitsuba_cfs.bsdf.xml import BsdfFile, write_bsdf_xml
+from scenes.demo import FOLDER
 
-FOLDER = Path(__file__).parent
 BLIND = plastic("55 % grey", 0.55, specular=0.01, roughness=0.06)
 TILT_DEG = 45.0
 PANES = {  # outer, inner: normal transmittance, front and back reflectance
@@ -38,6 +36,7 @@ PANES_THICKNESS = 0.024  # [m]
 BLIND_TO_GLASS, BLIND_TO_AIR = 6.0, 18.0  # [W/(m2 K)] EN 13363-1, external blind
 BEFORE_BLIND = 1 / BLIND_TO_AIR, 1 / BLIND_TO_GLASS, GAP  # [m2 K/W] on the way in to each layer
 BLIND_TOTAL = 1 / GLAZING_U + sum(BEFORE_BLIND[:2])  # [m2 K/W]
+PLACE = 'shading_position = "external"  # before the glazing\n'
 BEAM = 'see_through = "specular"  # the beam between the slats\n'
 PATHS = 262_144  # for each incident patch and side
 
@@ -49,7 +48,7 @@ def main() -> None:
     panes = {band: [specular_klems(pane, KLEMS_FULL) for pane in pair] for band, pair in PANES.items()}
     blinds = {band: combine_layers([blind, *pair]) for band, pair in panes.items()}
     name = f"Exterior venetian blind at {TILT_DEG:.0f} degrees, double low-e glazing"
-    text = thermal_values(blinds["Solar"], BEFORE_BLIND, BLIND_TOTAL) + BEAM
+    text = thermal_values(blinds["Solar"], BEFORE_BLIND, BLIND_TOTAL) + PLACE + BEAM
     _write("venetian_blind", blinds, name, layer.thickness + PANES_THICKNESS, 0.9, text)
     glazings = {band: combine_layers(pair) for band, pair in panes.items()}
     text = thermal_values(glazings["Solar"], (OUTER_FILM, GAP), 1 / GLAZING_U)
@@ -87,7 +86,7 @@ def thermal_values(system: LayeredSystem, resistances: tuple[float, ...], total:
     u_value = 1 / total
     names = ("blind", "outer pane", "inner pane")[-len(resistances) :]
     lines = [
-        "# written by scenes/demo/make_blind.py",
+        "# written by tests/demo/make_blind.py",
         f"u_value = {u_value:.3f}  # [W/(m2 K)]"
         + (" with the blind's air layer, EN 13363-1" if "blind" in names else ""),
         f"g_value = {g[0]:.4f}  # at normal incidence (Klems patch 0)",

@@ -1,4 +1,4 @@
-"""Write the demo's building, a two-room office in IFC4: `python -m scenes.demo.make_office [FILE]`.
+"""Write the demo's building, a two-room office in IFC4: `python -m tests.demo.make_office [FILE]`.
 
 Plan (metres, project coordinates; z = 0 is the finished floor, rooms are 3.0 high):
 
@@ -37,6 +37,8 @@ import ifcopenshell.api.style
 import ifcopenshell.api.unit
 import numpy as np
 from numpy.typing import NDArray
+
+from scenes.demo import OFFICE
 
 
 @dataclass(frozen=True, slots=True)
@@ -548,14 +550,13 @@ def _fix_identity(model: ifcopenshell.file) -> None:
     header.time_stamp = "2026-01-01T00:00:00"
     header.author = ("mitsuba-cfs contributors",)
     header.organization = ("mitsuba-cfs",)
-    header.originating_system = "scenes/demo/make_office.py"
+    header.originating_system = "tests/demo/make_office.py"
 
 
 def main() -> None:
     """Write the model to the file named, by default the one that is shipped."""
     parser = argparse.ArgumentParser(description="Write the demo's building, a two-room office.")
-    shipped = Path(__file__).with_name("office.ifc")
-    parser.add_argument("file", type=Path, nargs="?", default=shipped)
+    parser.add_argument("file", type=Path, nargs="?", default=OFFICE)
     target = parser.parse_args().file
     office().write(str(target))
     print(f"{target}: two rooms")
