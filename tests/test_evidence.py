@@ -22,7 +22,7 @@ NO_EVIDENCE = {
     "bsdf.md": {"| stated | by | used as | DGP |"},
     "daylight.md": {"| function | gives |"},
     "design.md": {"| table | keys |", "| key | what varies |", "| in the folder | what |"},
-    "fit.md": {"| table | keys |", "| column | content |", "| in the folder | what |"},
+    "fit.md": {"| table | keys |", "| quantity | unit | model |", "| in the folder | what |"},
     "glare.md": {"| index | of | source |", "| option | default | |", "| part of a five-phase picture | resolution |"},
     "radiance.md": {"| type | as | status | how |"},
     "thermal.md": {"| to | read |", "| closure | absorptances from | layer resistance | film resistances |"},

@@ -50,6 +50,8 @@ def _print(result: FitResult) -> None:
             line += "; the readings do not determine it: this is the interval of its prior"
         elif row["only_with"]:
             line += f"; known only together with {row['only_with']}"
+        if row["doubtful"]:
+            line += "; at a bound or far from its prior: the model may lack something"
         click.echo(line)
     words = {"fitted": "fitted readings", "predicted": "predicted readings"}
     for name, share in result.coverage.items():

@@ -60,7 +60,7 @@ class Prior:
 
 
 @dataclass(frozen=True, slots=True)
-class Noise:
+class ReadingNoise:
     """Errors of the readings about the model, of a group of instruments."""
 
     deviation: float  # a share where errors are relative
@@ -70,7 +70,7 @@ class Noise:
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
+class FittedValues:
     """Parameters fitted to readings."""
 
     value: Array  # [p]
@@ -79,7 +79,7 @@ class Estimate:
     high: Array
     modelled: Array  # [N] at `value`
     expanded_at: Array  # [p] near `value`, where the derivatives were computed
-    noise: dict[str, Noise]  # by group
+    noise: dict[str, ReadingNoise]  # by group
     steps: int
     converged: bool
 
@@ -89,7 +89,7 @@ class Estimate:
         error: Array = np.sqrt(np.diag(self.covariance))
         return error
 
-    def of_first(self, count: int) -> Estimate:
+    def of_first(self, count: int) -> FittedValues:
         """The estimate of the first parameters."""
         part = slice(count)
         values = {key: getattr(self, key)[part] for key in ("value", "low", "high", "expanded_at")}
@@ -110,7 +110,7 @@ class Model(Protocol):
 
 def estimate(
     model: Model, readings: Sequence[Readings], prior: Prior, report: Callable[[float], None] = lambda share: None
-) -> Estimate:
+) -> FittedValues:
     """The parameters that readings and prior make most likely, with intervals.
 
     Derivatives are computed again where a parameter has moved by more than `FAR`, at the end `NEAR`.
@@ -134,7 +134,7 @@ def estimate(
         error = np.sqrt(np.diag(_covariance(whitener, log_noise, slopes, prior)))
         done = bool(np.all(np.abs(wanted - theta) <= CLOSE * error))
         if not done:
-            theta, values = _stepped(model, whitener, log_noise, theta, values, wanted, prior)
+            theta, values = _stepped(model, whitener, log_noise, theta, values, wanted=wanted, prior=prior)
         moved = _moved(theta, of_slopes, prior)
     whitener.scale_by(values)
     log_noise = _likeliest_noise(whitener, values, slopes, theta, prior, log_noise)
@@ -144,7 +144,7 @@ def estimate(
     covariance = _covariance(whitener, log_noise, slopes, prior, widened)
     half = NORMAL * np.sqrt(np.diag(covariance))
     low, high = np.maximum(theta - half, prior.low), np.minimum(theta + half, prior.high)
-    return Estimate(theta, covariance, low, high, values, of_slopes, noise, steps, done and moved <= NEAR)
+    return FittedValues(theta, covariance, low, high, values, of_slopes, noise, steps, done and moved <= NEAR)
 
 
 def _moved(theta: Array, other: Array, prior: Prior) -> float:
@@ -153,7 +153,7 @@ def _moved(theta: Array, other: Array, prior: Prior) -> float:
 
 
 def _stepped(
-    model: Model, w: _Whitener, log_noise: Array, theta: Array, values: Array, wanted: Array, prior: Prior
+    model: Model, w: _Whitener, log_noise: Array, theta: Array, values: Array, *, wanted: Array, prior: Prior
 ) -> tuple[Array, Array]:
     """Parameters and values after a step, halved until it is no step back."""
     before, share = _misfit(w, log_noise, values, theta, prior), 1.0
@@ -213,7 +213,7 @@ class _Whitener:
             total += float(np.log(-np.expm1(-2 * gap / np.exp(log_tau))).sum())
         return total
 
-    def noise(self, log_noise: Array) -> dict[str, Noise]:
+    def noise(self, log_noise: Array) -> dict[str, ReadingNoise]:
         """The noise of each group."""
         found = {}
         for number, group in enumerate(self.groups):
@@ -224,7 +224,7 @@ class _Whitener:
                     phi = np.exp(-gap / tau)
                     counts += len(gap) + 1
                     effective += 1.0 + float(((1 - phi) / (1 + phi)).sum())
-            found[group] = Noise(float(deviation), float(tau), counts, effective)
+            found[group] = ReadingNoise(float(deviation), float(tau), counts, effective)
         return found
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import json_text, write_table, write_text
 from mitsuba_cfs.progress import Progress, silent
-from scenes.fit.estimate import Estimate, estimate
+from scenes.fit.estimate import FittedValues, estimate
 from scenes.fit.fit_file import LEAST_READINGS, Fit
 from scenes.fit.model import KELVIN_NOISE, LIGHT_NOISE, FittedModel
 from scenes.head import Head
@@ -34,7 +34,7 @@ class FitResult:
     """A fitted study."""
 
     fit: Fit
-    estimate: Estimate
+    estimate: FittedValues
     parameters: pd.DataFrame  # a row each: prior, value, interval, whether readings determine it
     correlations: pd.DataFrame  # of the parameters, given the readings
     comparison: pd.DataFrame  # every reading beside the model, with 90 % intervals
@@ -94,7 +94,7 @@ def run_fit(fit: Fit, *, progress: Progress = silent, model: FittedModel | None 
     return FitResult(fit, found, _parameters(fit, found, correlations), correlations, comparison, coverage, model.head)
 
 
-def _parameters(fit: Fit, found: Estimate, correlations: pd.DataFrame) -> pd.DataFrame:
+def _parameters(fit: Fit, found: FittedValues, correlations: pd.DataFrame) -> pd.DataFrame:
     """The table of the parameters."""
     rows = []
     for number, one in enumerate(fit.tables.parameter):
@@ -115,14 +115,13 @@ def _parameters(fit: Fit, found: Estimate, correlations: pd.DataFrame) -> pd.Dat
                 "error_of_prior_percent": 100 * share,
                 "determined": share <= PRIOR_SHARE or far > UNLIKELY,
                 "only_with": partner,
-                "at_bound": bool(found.value[number] in (fit.low[number], fit.high[number])),
-                "deviations_from_prior": far,
+                "doubtful": far > UNLIKELY or bool(found.value[number] in (fit.low[number], fit.high[number])),
             }
         )
     return pd.DataFrame(rows)
 
 
-def _comparison(model: FittedModel, found: Estimate) -> pd.DataFrame:
+def _comparison(model: FittedModel, found: FittedValues) -> pd.DataFrame:
     """Each reading beside the fitted model, with the 90 % interval of a single reading."""
     whole, slopes = model.whole(found.value), model.whole_derivatives(found.expanded_at)
     variance = np.einsum("np,pq,nq->n", slopes, found.covariance, slopes)

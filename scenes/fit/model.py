@@ -50,7 +50,7 @@ KELVIN_NOISE, LIGHT_NOISE = "temperature", "light"  # groups of instruments with
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
+class MeasuredColumn:
     """The readings of an instrument, means of blocks of time steps."""
 
     table: MeasurementTable
@@ -109,7 +109,7 @@ class FittedModel:
         """Take the steps and the readings of each column."""
         self.fit = fit
         of_steps = by_step(fit.readings, self.weather)
-        self.columns: list[Column] = []
+        self.columns: list[MeasuredColumn] = []
         step_h, times = self.weather.step_h, self.weather.times
         for one in fit.tables.measurement:
             values = of_steps[one.column].to_numpy(dtype=float)
@@ -118,9 +118,11 @@ class FittedModel:
             number = np.floor(steps * step_h / max(fit.tables.average_h or 0.0, step_h) + 1e-9)
             block = np.unique(number, return_inverse=True)[1].reshape(-1)
             last = np.flatnonzero(np.diff(block, append=len(block)))
-            column = Column(one, steps, block, np.empty(0), np.empty(0), times[steps[last]])
+            column = MeasuredColumn(one, steps, block, np.empty(0), np.empty(0), times[steps[last]])
             if len(steps):
-                column = replace(column, values=column.means(values[steps]), hours=column.means(steps * step_h))
+                column = replace(
+                    column, values=column.means(values[steps]), hours=column.means(step_h * steps.astype(np.float64))
+                )
             self.columns.append(column)
         light = [column.steps for column in self.columns if column.light]
         self._lit_steps = np.unique(np.concatenate(light)) if light else np.empty(0, dtype=np.int64)

@@ -85,6 +85,10 @@ def answer(result: FitResult) -> tuple[str, ...]:
     ]
     pairs = {tuple(sorted((a, b))) for a, b in zip(table["parameter"], table["only_with"], strict=True) if b}
     lines += [gettext("{first} and {second} are known only together.", first=a, second=b) for a, b in sorted(pairs)]
+    lines += [
+        gettext("{name} is at a bound or far from its prior: the model may lack something.", name=name)
+        for name in table.loc[table["doubtful"], "parameter"]
+    ]
     if "predicted" in result.coverage:
         share = rounded(100 * result.coverage["predicted"], 0)
         lines.append(gettext("{share} % of the predicted readings are within their 90 % interval.", share=share))
