@@ -201,7 +201,7 @@ def set_key(table: Any, parts: list[str], value: Any, *, made: bool) -> None:
         if first.isdecimal():
             if int(first) >= len(table):
                 raise DataError(f"there is no entry {first}: there are {len(table)}")
-            if not rest:
+            if not rest and isinstance(table, list):
                 table[int(first)] = value
                 return
             set_key(table[int(first)], rest, value, made=made)
