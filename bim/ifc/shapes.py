@@ -20,10 +20,6 @@ LOG = logging.getLogger(__name__)
 # exact polyhedra first, OpenCASCADE for curved bodies: half the time of OpenCASCADE alone on the
 # files tried, and one of them (247 walls, 5 MB zipped) was not finished by it in five minutes
 KERNEL = "hybrid-cgal-simple-opencascade"
-# Openings that the first kernel cannot cut, as those that touch the wall's edge, cost OpenCASCADE 0.2 s
-# a wall.  Manifold takes a fiftieth of that and leaves the same body to 5e-5 m, but cuts by half-spaces
-# wrongly: it has the walls whose bodies and openings all are extruded polygons.
-PRISM_KERNEL = "hybrid-cgal-simple-manifold-opencascade"
 NO_ELEMENTS = ("IfcSpace", "IfcOpeningElement", "IfcOpeningStandardCase")
 SKIPPED = (  # classes that neither bound a room nor shade a window: they are not meshed at all
     "IfcAnnotation",
@@ -110,26 +106,18 @@ def read_shapes(
         ]
         if not wanted:
             return {}, []
-        prisms = [product for product in wanted if cut_openings and _is_cut_prism(product)]
-        number = {product.id() for product in prisms}
-        others = [product for product in wanted if product.id() not in number]
-        done = 0
-        for kernel, products in ((PRISM_KERNEL, prisms), (KERNEL, others)):
-            if not products:
-                continue
-            iterator = ifcopenshell.geom.iterator(
-                settings, model, os.cpu_count() or 1, include=products, geometry_library=kernel
-            )
-            if iterator.initialize():
-                while True:
-                    shape = _shape(iterator.get(), styles)
-                    if shape is not None:
-                        shapes[shape.step_id] = shape
-                    if progress is not None:
-                        progress((done + len(products) * iterator.progress() / 100) / len(wanted))
-                    if not iterator.next():
-                        break
-            done += len(products)
+        iterator = ifcopenshell.geom.iterator(
+            settings, model, os.cpu_count() or 1, include=wanted, geometry_library=KERNEL
+        )
+        if iterator.initialize():
+            while True:
+                shape = _shape(iterator.get(), styles)
+                if shape is not None:
+                    shapes[shape.step_id] = shape
+                if progress is not None:
+                    progress(iterator.progress() / 100)
+                if not iterator.next():
+                    break
     except RuntimeError as error:
         LOG.warning("geometry: %s", error)
     issues = [
@@ -140,32 +128,6 @@ def read_shapes(
     # the iterator gives shapes as its threads finish them, which no two runs do alike: in that
     # order a model would have another hash in the cache, and other sums, each time it is read
     return {p.id(): shapes[p.id()] for p in wanted if p.id() in shapes}, issues
-
-
-def _is_cut_prism(product: ifcopenshell.entity_instance) -> bool:
-    """Whether a product has openings, and its bodies and theirs are extruded polygons alone."""
-    openings = [relation.RelatedOpeningElement for relation in getattr(product, "HasOpenings", None) or ()]
-    if not openings or not _body_items(product):
-        return False
-    return all(_is_prism(item) for body in (product, *openings) for item in _body_items(body))
-
-
-def _body_items(product: ifcopenshell.entity_instance) -> list[ifcopenshell.entity_instance]:
-    if product.Representation is None:
-        return []
-    bodies = (r for r in product.Representation.Representations if (r.RepresentationIdentifier or "Body") == "Body")
-    return [item for body in bodies for item in body.Items]
-
-
-def _is_prism(item: ifcopenshell.entity_instance) -> bool:
-    if item.is_a("IfcMappedItem"):
-        return all(map(_is_prism, item.MappingSource.MappedRepresentation.Items))
-    if item.is_a() != "IfcExtrudedAreaSolid":
-        return False
-    kind = item.SweptArea.is_a()
-    if kind == "IfcArbitraryClosedProfileDef":
-        return bool(item.SweptArea.OuterCurve.is_a("IfcPolyline"))
-    return kind == "IfcRectangleProfileDef"
 
 
 def _has_body(product: ifcopenshell.entity_instance) -> bool:

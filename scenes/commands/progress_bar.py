@@ -216,8 +216,8 @@ COMPILE = "from scenes.commands.progress_bar import compile_now; compile_now()"
 def compiled_beside() -> Iterator[None]:
     """Compile the heat balance in another process meanwhile, if it is not compiled yet.
 
-    That process stores the compiled code in this process's cache; this process waits for what the
-    other is compiling, and compiles what it has not begun.
+    That process stores the compiled code in this process's cache; if it is late or fails, this
+    process compiles.
     """
     from mitsuba_cfs.compiled import must_compile
     from thermal.kernel import advance

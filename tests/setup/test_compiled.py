@@ -84,13 +84,11 @@ def test_code_of_another_version_with_other_types_is_compiled_again(tmp_path) ->
 
 CALL = """
 import sys, time
-from contextlib import nullcontext
 from pathlib import Path
 
+import pytest
 import numpy as np
 from numba.core.caching import IndexDataCacheFile
-from mitsuba_cfs import compiled
-compiled._locked = nullcontext  # as on a system without locks
 import increment
 kind, before = sys.argv[1:]
 act = getattr(IndexDataCacheFile, before, None)
@@ -131,50 +129,6 @@ def test_processes_that_compile_at_once_never_get_each_others_code(tmp_path) -> 
         assert process.communicate(timeout=120)[0] and process.returncode == 0
     found = {kind: start(kind).communicate(timeout=120)[0].strip() for kind in ("i8", "f8")}
     assert found == {"i8": "2", "f8": "2.0"}
-
-
-ONCE = """
-import fcntl, sys
-import numpy as np
-from numba.core import event
-import increment
-begun = []
-class Begun(event.Listener):
-    def on_start(self, of):
-        begun.append(of)
-        print("begun", flush=True)
-        sys.stdin.readline()
-    def on_end(self, of):
-        pass
-event.register("numba:compile", Begun())
-lock = fcntl.flock
-def asked(*given):
-    print("asks", flush=True)
-    lock(*given)
-fcntl.flock = asked
-print(increment.increment(np.array([1.0])), len(begun))
-"""
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="no locks of files")
-def test_two_processes_compile_a_function_once(tmp_path) -> None:
-    """The second asks for it while the first compiles."""
-    source = "from mitsuba_cfs.compiled import compiled\n@compiled()\ndef increment(x):\n    return x[0] + 1\n"
-    (tmp_path / "increment.py").write_text(source)
-    paths = os.pathsep.join([str(tmp_path), str(REPOSITORY)])
-    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / "kept"), "PYTHONPATH": paths}
-    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
-
-    def start(*lines: str) -> subprocess.Popen[str]:
-        process = subprocess.Popen([sys.executable, "-c", ONCE], cwd=tmp_path, env=environment, **pipes)
-        for line in lines:
-            assert process.stdout.readline().strip() == line
-        return process
-
-    first = start("asks", "begun")
-    second = start("asks", "asks")  # it got no lock
-    assert first.communicate("\n", timeout=120)[0].split()[-2:] == ["2.0", "1"]
-    assert second.communicate("\n", timeout=120)[0].split()[-2:] == ["2.0", "0"]
 
 
 ENTRY = """
