@@ -30,7 +30,7 @@ from bim.ifc.corrections import corrections_beside, corrections_file
 from bim.ifc.head import check_head
 from bim.model import Building, Construction, Element, Face, Georeference, MaterialLayer, Space, SpaceGroup, Window
 from bim.names import AmbiguousName, UnknownName, has_words, unknown_room
-from bim.report.issue import Effect, Issue, Phrase, issue_text
+from bim.report.issue import Effect, Issue, Phrase, Term, issue_text
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import read_json, sha256
 from mitsuba_cfs.gloss import Gloss
@@ -57,6 +57,7 @@ RECORDS = {
         Space,
         SpaceGroup,
         StoreyAccount,
+        Term,
         Window,
     )
 }

@@ -54,7 +54,7 @@ UNCUT = 100_000  # columns of a table that nobody sees
     "record",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="FILE.json",
-    help="Also write rooms, windows, problems and the 3D model as data for other programs.",
+    help="Also write it as data for other programs; rooms, windows, problems and the 3D model.",
 )
 @no_cache_option
 def command(

@@ -83,8 +83,8 @@ def list_rules(context: click.Context, _: click.Parameter, value: bool) -> None:
 @click.option(
     "--operation",
     type=FILE,
-    help="Operation file whose [control] moves the blinds for glare, temperatures and light at the eye; "
-    "default: LM-83's rule.",
+    help="TOML file: shading states and control, gains, set points; its [control] moves the blinds for glare, "
+    "temperatures and light at the eye; default: LM-83's rule.",
 )
 @click.option("--uses", type=FILE, help="TOML file of room uses; see docs/comply.md.")
 @click.option(

@@ -212,22 +212,28 @@ def survey(files: tuple[Path, ...], table: Path | None) -> None:
 
 @command.command()
 @click.argument("building", type=IFC_FILE, metavar="BUILDING.ifc")
-@click.option("--json", "table", type=click.Path(dir_okay=False, path_type=Path), help="Also write it as JSON.")
-def info(building: Path, table: Path | None) -> None:
+@click.option(
+    "--json",
+    "record",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE.json",
+    help="Also write it as data for other programs.",
+)
+def info(building: Path, record: Path | None) -> None:
     """Show what an IFC file states: program, units, site, north, storeys, elements.
 
     Its geometry is not read: `cfs check` lists rooms, windows and problems.
     """
-    if table is not None:
-        check_file(table, field="--json", inputs=[building])
+    if record is not None:
+        check_file(record, field="--json", inputs=[building])
     from bim.ifc.summary import summary
 
     models = summary(building)
     for model in models:
         for line in _info_lines(model):
             click.echo(line)
-    if table is not None:
-        write_text(table, json_text(models))
+    if record is not None:
+        write_text(record, json_text(models))
 
 
 def _info_lines(model: dict[str, Any]) -> Iterator[str]:

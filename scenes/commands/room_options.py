@@ -228,7 +228,7 @@ height_option = click.option(
     type=click.FloatRange(0, 5),
     default=_GRID.height,
     show_default=True,
-    help="Height of the work plane above the floor [m].",
+    help="Height of the work plane above the floor [m]; of the grid of sensors.",
 )
 subdivision_option = click.option(
     "-m",

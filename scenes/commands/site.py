@@ -33,14 +33,14 @@ def command() -> None:
     required=True,
     multiple=True,
     type=FILE,
-    help="What is to be built: a file as those of --surroundings (cfs export --gltf writes one).",
+    help="Proposed building: a file as those of --surroundings (cfs export --gltf writes one).",
 )
 @click.option(
     "--height",
-    type=click.FloatRange(0, 3, min_open=True),
+    type=click.FloatRange(0, 5),
     default=0.85,
     show_default=True,
-    help="Height of the working plane for the no-sky line [m].",
+    help="Height of the work plane above the floor [m]; of the no-sky line.",
 )
 @no_cache_option
 @out_folder_option

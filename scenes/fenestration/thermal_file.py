@@ -23,7 +23,6 @@ Paths are relative to the TOML file.  The angular function is for the visible ba
 from __future__ import annotations
 
 import csv
-import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -50,7 +49,7 @@ from mitsuba_cfs.bsdf.spectral_pane import (
     spectral_glazing,
 )
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import reason, write_text
+from mitsuba_cfs.files import json_text, reason, write_text
 from mitsuba_cfs.spectra.detectors import NANOMETRES
 from scenes import plausible
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
@@ -502,7 +501,7 @@ def write_slat_light(light: SlatLight, path: Path) -> None:
         "reflectance": [round(value, 5) for value in light.reflectance[::SLAT_STEP].tolist()],
         "shares": np.round(light.shares, 4).tolist(),
     }
-    write_text(path, json.dumps(document, separators=(",", ":")) + "\n")
+    write_text(path, json_text(document, separators=(",", ":")) + "\n")
 
 
 def read_slat_light(path: Path) -> SlatLight:

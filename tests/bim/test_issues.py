@@ -30,7 +30,7 @@ def test_a_template_is_translated_before_it_is_filled():
         "{element} is glass between the rooms {rooms}": "{element} ist Glas zwischen {rooms}",
         EFFECT: "gilt als undurchsichtig",
     }
-    text = issue_text(GLASS, fill=lambda one, _, **values: german.get(one, one).format(**values))
+    text = issue_text(GLASS, fill=lambda one, _="", **values: german.get(one, one).format(**values))
     assert text.what == "IfcWindow W1 ist Glas zwischen A, B"
     assert text.effect == "gilt als undurchsichtig"
     assert set(german) <= set(templates())
@@ -38,7 +38,9 @@ def test_a_template_is_translated_before_it_is_filled():
 
 def test_phrases_within_values_are_translated():
     repaired = Issue("space-repaired", "S", {"room": "R1", "repair": Phrase("holes-capped")})
-    text = issue_text(repaired, fill=lambda one, _, **values: {"holes capped": "Löcher"}.get(one, one).format(**values))
+    text = issue_text(
+        repaired, fill=lambda one, _="", **values: {"holes capped": "Löcher"}.get(one, one).format(**values)
+    )
     assert text.effect == "it is repaired: Löcher"
 
 

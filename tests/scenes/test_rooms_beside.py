@@ -132,7 +132,7 @@ def test_a_worker_with_other_files_than_the_command_has_computes_nothing(tmp_pat
 
     def command() -> rooms._FromFiles:
         run = rooms._identity(options, read_inputs(options))
-        return rooms._FromFiles(True, options, run)
+        return rooms._FromFiles(True, options, run, {})
 
     before = command()
     (name,) = {space.guid for space in read_inputs(options).spaces if "Hall" in space.label}

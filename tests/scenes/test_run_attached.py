@@ -179,7 +179,6 @@ def test_the_module_runs_as_a_program() -> None:
 
 
 FULL = """
-shading_position = "external"
 u_model = "gap"
 realised_inner_resistance = 0.125
 realised_outer_resistance = 0.033

@@ -31,7 +31,7 @@ SECOND = f"""
 [[system]]
 name = "brighter"
 bsdf = "{VENETIAN_BLIND}"
-g_value = 0.3
+g_value = 0.35
 """
 WRONG = {
     "no system": ("", BOX + CLIMATE, "system: is missing"),

@@ -158,7 +158,7 @@ def test_the_sun_through_a_crown_by_month_is_that_of_beers_law(variant, weather,
 
 
 def test_what_trees_let_pass_is_said_at_the_head(behind):
-    for notes in (model_notes(behind), head_of(behind).lines):
+    for notes in (model_notes(behind, behind.issues), head_of(behind).lines):
         (said,) = (note for note in notes if "tree" in note)
         assert "3 % from May to October, 46 % from November to April" in said
 

@@ -45,6 +45,18 @@ def _study(inputs: Path, out: Path) -> list[object]:
     return ["study", study_file(inputs, "orientations_deg = [0, 90]\n"), "--out", out]
 
 
+def _fit(inputs: Path, out: Path) -> list[object]:
+    """Temperatures of two days that rise evenly, and the air change."""
+    study = thermal_file(inputs, "")
+    rows = [f"2017-05-{day:02d}T{hour:02d}:00,{20 + day + hour / 24:.3f}\n" for day in (2, 3) for hour in range(24)]
+    (inputs / "measured.csv").write_text("time,air\n" + "".join(rows))
+    file = inputs / "fit.toml"
+    head = f'study = "{study.name}"\nmeasured = "measured.csv"\n'
+    head += '[[measurement]]\ncolumn = "air"\nquantity = "air temperature"\n'
+    file.write_text(head + '[[parameter]]\nkey = "air.infiltration_ach"\nmean = 0.5\ndeviation = 0.2\nlow = 0.02\n')
+    return ["fit", file, "--out", out]
+
+
 def _design(inputs: Path, out: Path) -> list[object]:
     head = '[[variable]]\nkey = "room.box.window.width"\nvalues = [1.0, 2.0]\n'
     head += '[[objective]]\nname = "daylight autonomy"\n[search]\nevaluations = 4\nrepeats = 0\n'
@@ -121,6 +133,7 @@ JOBS = {
     "explore": Job(lambda inputs, out: ["explore", _explorer(inputs), "--out", out], folder=True),
     "study": Job(_study, folder=True),
     "design": Job(_design, folder=True),
+    "fit": Job(_fit, folder=True),
     "study --write-ifc": Job(
         lambda inputs, out: ["study", _study_of_the_office(inputs), "--out", inputs / "results", "--write-ifc", out],
         "out.ifc",
@@ -173,7 +186,7 @@ JOBS = {
     "calibrate": Job(lambda _, out: ["calibrate", "--out", out], "out.json"),
 }
 # they take ten seconds and more; the same code writes for the others, which stay quick
-HEAVY = ("study", "design", "study --write-ifc", "demo", "pv", "ifc survey", "comply", "comply --write-ifc")
+HEAVY = ("study", "design", "fit", "study --write-ifc", "demo", "pv", "ifc survey", "comply", "comply --write-ifc")
 
 
 def heavy_ones_slow(names: Iterable[str]) -> list[ParameterSet]:
