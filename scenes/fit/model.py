@@ -143,7 +143,7 @@ class FittedModel:
         return found
 
     def prior(self) -> Prior:
-        """That of the parameters, then of an offset of each light meter: the noise of tracing, alike in all hours."""
+        """That of the parameters, then an offset of each light meter: the noise of tracing, the same in all hours."""
         fit, count = self.fit, len(self._meters())
         self.whole_derivatives(fit.mean)
         noise = np.array([max(self.tracing_error.get(at, 0.0), LEAST_OFFSET) for at in self._meters()])

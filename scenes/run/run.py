@@ -84,22 +84,20 @@ def computed_rooms(
     """
     coupled = balanced_together(inputs, options)
     spaces = run_spaces(inputs, options)
-    if inputs.operation is not None:
-        inputs = replace(
-            inputs,
-            operation=with_shared_states(
-                inputs.operation,
-                inputs.building,
-                spaces,
-                inputs.systems,
-                inputs.weather,
-                options.room,
-                skies=skies,
-                cache=MatrixCache.of_user() if options.cache else None,
-                inner=options.inner_glass,
-                progress=progress,
-            ),
-        )
+    operation = with_shared_states(
+        inputs.operation,
+        inputs.building,
+        spaces,
+        inputs.systems,
+        inputs.weather,
+        options.room,
+        skies=skies,
+        cache=MatrixCache.of_user() if options.cache else None,
+        inner=options.inner_glass,
+        progress=progress,
+    )
+    if operation is not inputs.operation:
+        inputs = replace(inputs, operation=operation)
     store = StoredArrays() if len(spaces) > 1 else None
     with scratch_folder() as folder:
         equal = template_rooms(spaces)

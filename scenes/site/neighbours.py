@@ -58,13 +58,13 @@ def window_table(before: Site, after: Site, sun: SunYear) -> pd.DataFrame:
     rows = []
     north = after.building.latitude_deg is None or after.building.latitude_deg >= 0
     for space in before.building.spaces:
+        own_before, own_after = (site.outdoors.windows_of(space) for site in (before, after))
         for opening in openings_of(space):
             if opening.is_horizontal:
                 continue
-            point = reference_point(opening, before.outdoors, before.outdoors.windows_of(space))
+            point = reference_point(opening, before.outdoors, own_before)
             row: dict[str, object] = {"room": space.label, "window": opening.window.name or opening.window.guid}
-            for name, site in (("before", before), ("after", after)):
-                own = site.outdoors.windows_of(space)
+            for name, site, own in (("before", before, own_before), ("after", after, own_after)):
                 row[f"vsc_{name}_percent"] = 100 * vertical_sky_component(point, opening.normal, site.outdoors, own)
                 year, winter = sunlight_hours(point, opening.normal, site.outdoors, own, sun)
                 row[f"apsh_{name}_percent"], row[f"apsh_winter_{name}_percent"] = 100 * year, 100 * winter

@@ -112,11 +112,11 @@ def reflections(observer: Observer, mirrors: Mirrors, sun: SunYear) -> pd.DataFr
     for normal, glass, names in mirrors.planes:
         towards = sun.directions @ normal
         rays = sun.directions - 2 * towards[:, None] * normal  # from the point to the mirrored sun
-        steps = np.flatnonzero((towards > 0) & np.isfinite(_glass(observer, rays, glass)[0]))
-        rays, cosine = rays[steps], towards[steps]
-        far, triangle = _glass(observer, rays, glass)
         origin = np.tile(observer.point, (len(rays), 1))
-        free = mirrors.outdoors.first_hits(origin, rays, mirrors.panes)[0] > far - NEAR
+        far, triangle = glass.first_hits(origin, rays)
+        steps = np.flatnonzero((towards > 0) & np.isfinite(far))
+        rays, cosine, far, triangle = rays[steps], towards[steps], far[steps], triangle[steps]
+        free = mirrors.outdoors.first_hits(origin[steps], rays, mirrors.panes)[0] > far - NEAR
         steps, rays, cosine, far, triangle = steps[free], rays[free], cosine[free], far[free], triangle[free]
         at = observer.point + far[:, None] * rays + NEAR * normal
         free = ~np.isfinite(mirrors.outdoors.first_hits(at, sun.directions[steps], mirrors.panes)[0])
@@ -160,10 +160,6 @@ def observer_row(observer: Observer, table: pd.DataFrame, step_h: float) -> dict
         for key in ("lux", "luminance_cd_m2", "time", "window", "azimuth_deg", "altitude_deg"):
             row[f"brightest_{key}"] = worst[key]
     return row
-
-
-def _glass(observer: Observer, rays: FloatArray, glass: RayMesh) -> tuple[FloatArray, NDArray[np.int64]]:
-    return glass.first_hits(np.tile(observer.point, (len(rays), 1)), rays)
 
 
 def _reflectance(theta: FloatArray, normal: float) -> FloatArray:
