@@ -28,6 +28,7 @@ from scenes.input_options import NO_OPTIONS, InputOptions
 from scenes.room.control_groups import shared_groups
 from scenes.room.operation import (
     Operation,
+    assumed_ground_note,
     check_schedules,
     check_states,
     ground_note,
@@ -153,7 +154,7 @@ def inputs_of(
     notes = (
         *stated_note(building, "" if operation is None else operation.file.name),
         *_unstated(operation, used, building, heat_of),
-        *(() if operation is None else ground_note(operation.tables)),
+        *_ground_notes(operation, building, heat_of),
         *_state_notes(options, operation, filled, systems, building),
         *(() if operation is None else tilt_note(operation.systems)),
     )
@@ -202,6 +203,13 @@ def first_states(systems: Systems) -> Systems:
 def every_state(systems: Systems) -> Systems:
     """Each window in all its states."""
     return systems
+
+
+def _ground_notes(operation: Operation | None, building: Building, heat_of: RoomOptions | None) -> tuple[str, ...]:
+    """Sentences on the ground below the rooms whose heat is balanced."""
+    if operation is not None:
+        return ground_note(operation.tables, building)
+    return () if heat_of is None else assumed_ground_note(building)
 
 
 def _unstated(

@@ -622,5 +622,5 @@ def study_inputs(study: StudyFile, files: HeatFiles | None = None, progress: Pro
     rooms = "all" if study.couple or study.box is not None else "glazed"
     inputs = inputs_of(building, options, files.inputs, rooms=rooms, states=every_state, tables=study)
     notes = *stated_note(building, "the study"), *unstated_note(study, building, "the study")
-    inputs = replace(inputs, notes=(*notes, *ground_note(study)))
+    inputs = replace(inputs, notes=(*notes, *ground_note(study, building)))
     return replace(inputs, spaces=shared_constructions(inputs.spaces)) if study.couple else inputs

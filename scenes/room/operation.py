@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from bim.ground_floor import ground_floor
 from bim.model import Building, Space
 from bim.use import ScheduledValue, StatedUse, YearSchedule
 from mitsuba_cfs.errors import DataError
@@ -26,7 +27,7 @@ from scenes.fenestration.thermal_file import StateTable, read_reflectance
 from scenes.fenestration.thermal_system import checked_system
 from scenes.fenestration.tilts import tilt_states
 from scenes.room.luminaires import placed_spectrum
-from scenes.room.operation_tables import PARTS, GainsTable, OperationTables, RoomsTable, operated_tables
+from scenes.room.operation_tables import PARTS, GainsTable, GroundTable, OperationTables, RoomsTable, operated_tables
 from scenes.room.options import RoomOptions
 from scenes.room.schedules import WEEK, ScheduleTable, scheduled_fields
 from scenes.room.shading_rules import WEATHER_RULES, ShadingRule
@@ -282,6 +283,7 @@ class OperationHours:
 
 
 Tables = TypeVar("Tables", bound=OperationTables)
+YEAR_DAYS = 360  # of weather that make a year
 PREFIX = "of the building's file: "  # of the names of schedules that the building's file contains
 
 
@@ -572,9 +574,29 @@ def unstated_note(source: OperationTables | RoomOptions, building: Building, fil
     return (Note("{values}, not stated in {file}.", values=", ".join(unstated), file=file),)
 
 
-def ground_note(tables: OperationTables) -> tuple[str, ...]:
-    """A sentence on what the ground around a basement lacks; empty without a basement."""
+def ground_note(tables: OperationTables, building: Building) -> tuple[str, ...]:
+    """Sentences on the ground that is assumed, and on what the ground around a basement lacks."""
     grounds = [one.envelope.ground for one in tables.variants]
+    return (*assumed_ground_note(building, grounds), *_basement_note(grounds))
+
+
+def assumed_ground_note(building: Building, grounds: Sequence[GroundTable | None] = (None,)) -> tuple[str, ...]:
+    """A sentence on the ground below floors of which no `[envelope.ground]` is stated; empty without such floors."""
+    area, perimeter = ground_floor(building)
+    if None not in grounds or min(area, perimeter) <= 0:
+        return ()
+    note = Note(
+        "Floors on the ground without [envelope.ground] are computed by ISO 13370 with {area:.0f} m2 and "
+        "{perimeter:.0f} m of outer walls of the building's rooms, walls of 0.3 m, on sand (2 W/mK), "
+        "without edge insulation.",
+        area=area,
+        perimeter=perimeter,
+    )
+    return (note,)
+
+
+def _basement_note(grounds: Sequence[GroundTable | None]) -> tuple[str, ...]:
+    """A sentence on what the ground around a basement lacks; empty without a basement."""
     if not any(one is not None and one.kind.endswith("basement") for one in grounds):
         return ()
     note = Note(

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bim.defaults import FILMS
+from bim.ground_floor import DOWNWARDS, buried_depth, ground_floor
 from bim.model import Building, Face, Space, Window
 from bim.outer_faces import OuterFaces, outer_faces
 from bim.to_thermal import ThermalRoom, coupled_rooms, door_links, surface_neighbours, thermal_room
@@ -27,7 +28,7 @@ from mitsuba_cfs.trace.matrices.view_factors import sky_shares
 from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
 from scenes.results import DaylightResult, ShadingYear
 from scenes.room.inputs import RoomInputs
-from scenes.room.operation import OperationHours
+from scenes.room.operation import YEAR_DAYS, OperationHours
 from scenes.room.operation_tables import GainsTable, GroundTable, NeighbourTable, OperationTables
 from scenes.room.options import Occupancy
 from scenes.room.shading import RuledYear
@@ -53,7 +54,7 @@ from thermal.kernel import advance
 from thermal.ventilation import AirTransfer
 from thermal.zone import Dimming, Gains, Layer, OpaqueSurface, Zone, dimmed_light, dimmed_share, split_gains
 
-DOWNWARDS = -0.7  # z of a floor's normal
+LEAST_DEPTH = 0.05  # [m] of walls in the ground that make a basement
 
 
 def enveloped(
@@ -81,8 +82,9 @@ def enveloped(
                 replace(surface, layers=(layer,)) if own[0].kind == "window frame" else surface
                 for surface, own in zip(surfaces, faces, strict=True)
             ]
-        if envelope.ground is not None:
-            surfaces = _grounded(surfaces, envelope.ground, weather)
+        ground = envelope.ground or default_ground(building, space, weather)
+        if ground is not None:
+            surfaces = _grounded(surfaces, ground, weather, every=envelope.ground is not None)
         hours = OperationHours(tables, weather)
         for number, table in enumerate(envelope.neighbour):
             place = f"envelope.neighbour.{number}"
@@ -109,8 +111,27 @@ def glass_edge(window: Window) -> float:
     return float(sum(np.linalg.norm(side) for side in edges))
 
 
-def _grounded(surfaces: Sequence[OpaqueSurface], table: GroundTable, weather: Weather) -> list[OpaqueSurface]:
-    """The surfaces, those on the ground with soil and virtual layer (ISO 13370)."""
+def default_ground(building: Building, space: Space, weather: Weather) -> GroundTable | None:
+    """The ground below a room of which nothing is stated: ISO 13370 with area and perimeter of the building.
+
+    A room with walls in the ground is a basement as deep as these.  None: undisturbed soil at the outer face, for
+    weather of less than a year, and for a building without floors on the ground or outer walls above them.
+    """
+    area, perimeter = ground_floor(building)
+    if min(area, perimeter) <= 0 or len(weather.times) * weather.step_h < 24.0 * YEAR_DAYS:
+        return None
+    depth = buried_depth(space)
+    kind = {"kind": "basement", "depth": depth} if depth > LEAST_DEPTH else {"kind": "slab"}
+    return GroundTable.model_construct(area=area, perimeter=perimeter, **kind)
+
+
+def _grounded(
+    surfaces: Sequence[OpaqueSurface], table: GroundTable, weather: Weather, *, every: bool
+) -> list[OpaqueSurface]:
+    """The surfaces, those on the ground with soil and virtual layer (ISO 13370).
+
+    Args: every: refuse a surface that the table does not describe; else it keeps undisturbed soil.
+    """
     days = weather.midpoints
     hours = (days.day_of_year.to_numpy() - 1) * 24.0 + days.hour.to_numpy() + days.minute / 60.0
     year = harmonic(weather.dry_bulb_c, hours)
@@ -119,7 +140,8 @@ def _grounded(surfaces: Sequence[OpaqueSurface], table: GroundTable, weather: We
     area = table.area or sum(s.area for s in floors)
     grounded = []
     for surface in surfaces:
-        if surface.outside != "ground":
+        described = surface.normal[2] < DOWNWARDS or (table.kind == "basement" and abs(surface.normal[2]) < -DOWNWARDS)
+        if surface.outside != "ground" or not (every or described):
             grounded.append(surface)
             continue
         element = _element(surface, floors, table, area, wind)
@@ -537,10 +559,11 @@ def room_zone(
         lit = lamp_lux(room.operation, room.weather, at_lamps)
         area = room.space.floor_area
         operated_zone, lamps = operated(zone.zone, room.operation, area, room.weather, at_lamps)
-        zone = enveloped(replace(zone, zone=operated_zone), room.building, room.space, room.operation, room.weather)
+        zone = replace(zone, zone=operated_zone)
         services = services_of(room.operation, area, room.weather)
     else:
         services = plain_services(room.space, room.occupied, room.options.occupancy)
+    zone = enveloped(zone, room.building, room.space, room.operation or OperationTables(), room.weather)
     shares = [len(season.months) / 12 for season in room.seasons]
     exteriors = [scene.scene.exterior for scene in outdoors.scenes]
     zone = with_sky_view(

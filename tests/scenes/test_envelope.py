@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from mitsuba_cfs.sky.weather import Weather
 from scenes.demo import WEATHER
 from scenes.room.operation import OperationHours, check_schedules
 from scenes.room.operation_tables import OperationTables
-from scenes.room.zone import enveloped, glass_edge
+from scenes.room.zone import default_ground, enveloped, glass_edge
 from scenes.toml_file import validated
 from thermal.blackbox import Fenestration
 from thermal.ground import SOILS, Footprint, basement, slab_on_ground
@@ -98,6 +99,46 @@ def test_slab_takes_the_rooms_own_floor_without_an_area(weather) -> None:
     assert total == pytest.approx(1.0 / element.u_value)
 
 
+def test_ground_that_is_not_stated_is_that_of_iso_13370_for_the_building(weather) -> None:
+    """Not soil of the open field at the face of the slab: that takes several times the heat.
+
+    Two rooms of 20 m2 with one outer wall of 4 m each; the floor of the upper one is not on the ground."""
+    windows = (WindowRectangle(0.5, 1.0, 3.0, 1.5),)
+    box = shoebox(4.0, 5.0, 3.0, windows=windows, adjacency={"floor": "ground"})
+    upper = shoebox(4.0, 5.0, 3.0, windows=windows).spaces[0]
+    building = replace(box, spaces=(box.spaces[0], box.spaces[0], upper))
+    floor = surface(room_of("", weather, building).zone, DOWN)
+    before = surface(thermal_room(box.spaces[0], Fenestration("glass", 1.1)).zone, DOWN)
+    element = slab_on_ground(Footprint(40.0, 8.0, 0.3, SOILS["sand"]), sum(one.resistance for one in before.layers))
+    assert floor.outside == "known"
+    assert 0.17 + sum(layer.resistance for layer in floor.layers) == pytest.approx(1.0 / element.u_value)
+    assert np.mean(floor.beyond_c) == pytest.approx(np.mean(weather.dry_bulb_c), abs=0.05)
+
+
+def test_a_room_with_walls_in_the_ground_is_a_basement_as_deep_as_these(weather) -> None:
+    zone, place = zone_of("", weather), Footprint(20.0, 8.0, 0.3, SOILS["sand"])
+    resistances = [
+        sum(
+            layer.resistance
+            for layer in surface(thermal_room(BOX.spaces[0], Fenestration("glass", 1.1)).zone, at).layers
+        )
+        for at in (DOWN, (0, 1, 0))
+    ]
+    floor, wall = basement(place, *resistances, 3.0)
+    for one, at, film in ((floor, DOWN, 0.17), (wall, NORTH, 0.13)):
+        total = film + sum(layer.resistance for layer in surface(zone, at).layers)
+        assert total == pytest.approx(1.0 / one.u_value)
+
+
+def test_an_interior_room_and_some_days_of_weather_keep_undisturbed_soil(weather) -> None:
+    inner = shoebox(4.0, 5.0, 3.0, windows=(), adjacency={"floor": "ground"})
+    assert default_ground(inner, inner.spaces[0], weather) is None
+    box = shoebox(4.0, 5.0, 3.0, windows=(WindowRectangle(0.5, 1.0, 3.0, 1.5),), adjacency={"floor": "ground"})
+    assert default_ground(box, box.spaces[0], weather).perimeter == pytest.approx(4.0)
+    days = SimpleNamespace(times=weather.times[:48], step_h=1.0)
+    assert default_ground(box, box.spaces[0], days) is None
+
+
 def test_neighbours_bridges_and_frames(weather) -> None:
     zone = zone_of(
         """
@@ -122,7 +163,7 @@ otherwise = 15
     west = surface(zone, (-1, 0, 0))
     assert west.outside == "known" and set(np.unique(west.beyond_c)) == {15.0, 20.0}
     assert west.layers[0].resistance == pytest.approx(0.13)
-    assert [s.outside for s in zone.surfaces].count("known") == 1
+    assert [s.outside for s in zone.surfaces].count("known") == 3  # floor and back are in the ground
     edge = 2 * (2.8 + 1.3)
     assert glass_edge(BOX.spaces[0].windows[0]) == pytest.approx(edge)
     assert zone.bridges == pytest.approx(0.8 + 0.3 + 0.05 * edge)

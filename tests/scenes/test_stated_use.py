@@ -10,6 +10,7 @@ import pytest
 
 from bim.held_sensors import ModelGrid, ModelView
 from bim.honeybee.building import read_honeybee
+from bim.shoebox import WindowRectangle, shoebox
 from bim.use import ALWAYS, ScheduledValue, StatedUse, YearSchedule
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.images.view import View, fisheye
@@ -85,12 +86,21 @@ def test_a_file_without_uses_changes_nothing():
 def test_a_basement_says_that_its_ground_has_no_sun():
     ground = {"kind": "basement", "perimeter": 20.0, "depth": 2.5, "area": 20.0}
     below = {"ground": ground}
-    (note,) = ground_note(OperationTables(envelope=below))
+    (note,) = ground_note(OperationTables(envelope=below), shoebox())
     assert "sun and longwave radiation" in note
     one_room = OperationTables(rooms=[{"spaces": ["Cellar"], "envelope": below}])
-    assert ground_note(one_room) == (note,)
+    assert ground_note(one_room, shoebox()) == (note,)
     slab = {"ground": {"kind": "slab", "perimeter": 20.0}}
-    assert not ground_note(OperationTables(envelope=slab)) and not ground_note(OperationTables())
+    assert not ground_note(OperationTables(envelope=slab), shoebox())
+    assert not ground_note(OperationTables(), shoebox())
+
+
+def test_ground_that_nobody_states_is_named():
+    on_ground = shoebox(4, 5, 3, adjacency={"floor": "ground"}, windows=(WindowRectangle(0.5, 1.0, 3.0, 1.5),))
+    (note,) = ground_note(OperationTables(), on_ground)
+    assert "20 m2 and 4 m of outer walls" in note
+    slab = {"ground": {"kind": "slab", "perimeter": 20.0}}
+    assert not ground_note(OperationTables(envelope=slab), on_ground)
 
 
 def test_gains_and_leaks_that_nobody_states_are_named(used):
