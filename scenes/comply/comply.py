@@ -60,7 +60,7 @@ from scenes.room.heat import heat_alone
 from scenes.room.inputs import RoomInputs, room_inputs, skies_for
 from scenes.room.light import RoomLight, grid_points, room_light
 from scenes.room.luminaires import lamp_spectra
-from scenes.room.operation import Operation, check_states, used_operation
+from scenes.room.operation import Operation, assumed_ground_note, check_states, used_operation
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
 from scenes.room.room import StageTimes, asked_year, inputs_of_room
@@ -664,6 +664,7 @@ class Check:
                 "Temperatures for rules without a set-up are without heating and cooling, with {blinds}, "
                 "{air_changes:g} air changes per hour and gains in the hours of use."
             )
+            yield from assumed_ground_note(self.building)
             if any("heat" in r.parts and not r.setup for r in self.files.rules.values()):
                 yield Note(template, blinds=self.blinds, air_changes=room.infiltration_ach)
         if "open" in self.parts and self.calendar.median_diffuse is None:
