@@ -36,22 +36,24 @@ def buried_depth(space: Space) -> float:
 def _outer_length(space: Space) -> float:
     """Length [m] in plan of a room's upright faces to outdoors or ground, doors and windows included."""
     spans: dict[int, list[tuple[float, float, float]]] = {}  # by azimuth: plane, start, end
-    outer = [f for f in space.faces if f.adjacency in ("outside", "ground")]
-    for part in (*outer, *space.windows):
-        if abs(part.normal[2]) > UPRIGHT or getattr(part, "kind", "") == "reveal":
+    outer = [f for f in space.faces if f.adjacency in ("outside", "ground") and f.kind != "reveal"]
+    parts = [(f.normal, f.triangles) for f in outer] + [(w.normal, w.triangles) for w in space.windows]
+    for normal, triangles in parts:
+        if abs(normal[2]) > UPRIGHT:
             continue
-        azimuth = np.arctan2(part.normal[1], part.normal[0])
+        azimuth = np.arctan2(normal[1], normal[0])
         out = np.array([np.cos(azimuth), np.sin(azimuth)])
-        along = part.triangles[..., :2] @ np.array([-out[1], out[0]])
-        plane = float(part.triangles[..., :2].reshape(-1, 2).mean(axis=0) @ out)
+        along = triangles[..., :2] @ np.array([-out[1], out[0]])
+        plane = float(triangles[..., :2].reshape(-1, 2).mean(axis=0) @ out)
         key = round(float(np.degrees(azimuth))) % 360
         spans.setdefault(key, []).extend((plane, float(a.min()), float(a.max())) for a in along)
-    return sum(_covered(parts) for parts in spans.values())
+    return sum(_covered(one) for one in spans.values())
 
 
 def _covered(parts: Sequence[tuple[float, float, float]]) -> float:
     """Length [m] that parts of walls of one azimuth cover, plane by plane."""
-    total, walls = 0.0, []
+    total = 0.0
+    walls: list[list[tuple[float, float, float]]] = []
     for part in sorted(parts):
         if not walls or part[0] - walls[-1][-1][0] > SAME_WALL:
             walls.append([])

@@ -307,7 +307,7 @@ class NeighbourTable(TomlTable):
 class EnvelopeTable(TomlTable):
     """Properties of the envelope that a building model does not contain."""
 
-    ground: GroundTable | None = None  # without: undisturbed soil half a metre down
+    ground: GroundTable | None = None  # without: by the building's floors, `default_ground`
     neighbour: tuple[NeighbourTable, ...] = ()
     bridge: tuple[BridgeTable, ...] = ()
     # of all outdoor surfaces except frames

@@ -33,6 +33,7 @@ STUDY = f"""
 weather = "{WEATHER}"
 building = "{HOUSE}"
 spaces = ["Schlafzimmer", "Wohnen"]
+[[system]]
 [[system.layers]]
 thickness = 0.004
 conductivity = 1.0
