@@ -126,12 +126,7 @@ def _best(best: Sequence[Judged], fewest: int) -> str:
     names = listed(shown)
     count = len(best[0].cards)
     if not fewest:
-        return ngettext(
-            "{names} meets every limit.",
-            "{names} meet every limit.",
-            len(best),
-            names=names,
-        )
+        return ngettext("{names} meets every limit.", "{names} meet every limit.", len(best), names=names)
     if not best[0].met:
         return gettext("No system meets any of the limits.")
     facts = {"names": names, "met": best[0].met, "limits": count}
@@ -170,12 +165,7 @@ def _energy(order: Sequence[tuple[Judged, float | None]], best: Sequence[Judged]
 
 def _alone(room: Judged) -> str:
     if not room.failed:
-        return ngettext(
-            "{names} meets every limit.",
-            "{names} meet every limit.",
-            1,
-            names=room.name,
-        )
+        return ngettext("{names} meets every limit.", "{names} meet every limit.", 1, names=room.name)
     return gettext(
         "{name} meets {met} of {limits} limits and fails {failed}.",
         name=room.name,

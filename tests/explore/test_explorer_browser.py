@@ -118,6 +118,18 @@ def test_sliders_move_by_mouse_and_keys(page) -> None:
     assert "to" in _text(page, "#hour-now")
 
 
+def test_choices_that_are_overtaken_are_not_computed(page) -> None:
+    """A drag sends more events than hours can be computed: each would delay the next frame."""
+    page.value(
+        "(() => { const { panels } = cfs.explorer, one = panels[0], compute = one.compute; window.computed = [];"
+        "one.compute = function (hour) { computed.push(hour); return compute.call(one, hour); };"
+        "for (let day = 100; day < 150; day++) { date.value = day; date.dispatchEvent(new Event('input')); } })()"
+    )
+    page.until("cfs.explorer.now === 149 * 24 + Number(window.hour.value)")
+    assert page.value("computed.length") <= 3
+    assert page.value("document.getElementById('date-now').textContent") != ""
+
+
 def test_a_click_on_the_carpet_chooses_its_hour(page) -> None:
     page.click("#carpet", (100 + 0.5) / 365, (24 - 13 - 0.5) / 24)
     page.until(f"cfs.explorer.now === {100 * 24 + 13}")

@@ -48,9 +48,7 @@ def test_equal_systems_are_named_together_and_unknown_energy_is_left_out() -> No
 def test_rooms_that_fail_are_named_or_counted() -> None:
     good, bad = judged("R1", [SDA]), judged("R2", [SDA, ASE])
     assert rooms_answer([good, judged("R3", [SDA])]) == ("Every room meets every limit.")
-    assert rooms_answer([good, bad]) == (
-        "1 of 2 rooms meet every limit. R2 fails annual sunlight exposure."
-    )
+    assert rooms_answer([good, bad]) == ("1 of 2 rooms meet every limit. R2 fails annual sunlight exposure.")
     many = [good, *(judged(f"R{i}", [ASE, *[GLARE] * (i == 4)]) for i in range(5))]
     assert rooms_answer(many).endswith("Not met: Annual sunlight exposure in 5 rooms; Protection from glare in 1 room.")
     assert rooms_answer([judged("R", [FREE])]) == ""
