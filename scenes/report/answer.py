@@ -52,12 +52,12 @@ def rooms_answer(rooms: Sequence[Judged]) -> str:
         return _alone(rooms[0])
     failing = [room for room in rooms if room.failed]
     if not failing:
-        return gettext("Every room meets every limit in the table below.")
+        return gettext("Every room meets every limit.")
     met = len(rooms) - len(failing)
     if not met:
-        head = gettext("No room meets every limit in the table below.")
+        head = gettext("No room meets every limit.")
     else:
-        head = gettext("{met} of {all} rooms meet every limit in the table below.", met=met, all=len(rooms))
+        head = gettext("{met} of {all} rooms meet every limit.", met=met, all=len(rooms))
     if len(failing) <= MOST_NAMED:
         return f"{head} {semicolons([_fails(room, _names) for room in failing])}."
     counts = Counter(card.label for room in failing for card in room.failed)
@@ -126,14 +126,9 @@ def _best(best: Sequence[Judged], fewest: int) -> str:
     names = listed(shown)
     count = len(best[0].cards)
     if not fewest:
-        return ngettext(
-            "{names} meets every limit in the table below.",
-            "{names} meet every limit in the table below.",
-            len(best),
-            names=names,
-        )
+        return ngettext("{names} meets every limit.", "{names} meet every limit.", len(best), names=names)
     if not best[0].met:
-        return gettext("No system meets any of the limits in the table below.")
+        return gettext("No system meets any of the limits.")
     facts = {"names": names, "met": best[0].met, "limits": count}
     if len(best) == 1:
         return gettext(
@@ -170,12 +165,7 @@ def _energy(order: Sequence[tuple[Judged, float | None]], best: Sequence[Judged]
 
 def _alone(room: Judged) -> str:
     if not room.failed:
-        return ngettext(
-            "{names} meets every limit in the table below.",
-            "{names} meet every limit in the table below.",
-            1,
-            names=room.name,
-        )
+        return ngettext("{names} meets every limit.", "{names} meet every limit.", 1, names=room.name)
     return gettext(
         "{name} meets {met} of {limits} limits and fails {failed}.",
         name=room.name,

@@ -122,6 +122,8 @@ def test_a_system_of_the_library_is_a_variant_with_its_sheet(browser, served) ->
     states = served.project.states(system["operation"])
     assert [Path(one).name for one in states] == ["double-low-e.xml", "double-low-e-screen-5-grey.xml"]
     assert browser.value("document.querySelector('#chosen .sheet') !== null")
+    told = browser.value("document.querySelector('#chosen .card p').textContent")
+    assert told.startswith("Fabric by the model of") and ". Moves between the states of controlled " in told
 
 
 def test_the_commands_are_shown_before_they_run(browser, served) -> None:
@@ -168,6 +170,12 @@ def test_nothing_is_wider_than_the_window(browser, width) -> None:
         browser.value(f"location.hash = '#{step}'")
         browser.until(f"!document.getElementById('{step}').hidden")
         assert browser.value("document.documentElement.scrollWidth") <= width, step
+        link = f"document.querySelector('nav [href=\"#{step}\"]').getBoundingClientRect()"
+        assert browser.value(f"{link}.right") < width + 1, "the step that is shown is not in view"
+    browser.value("location.hash = '#building'")
+    browser.until("!document.getElementById('building').hidden")
+    rows = "[...document.querySelectorAll('#room-rows tr')].map((row) => row.getBoundingClientRect().height)"
+    assert max(browser.value(rows)) < 70, "a row of rooms is as tall as a column of words"
 
 
 @pytest.mark.skipif(not AXE.is_file(), reason="no axe-core")

@@ -102,7 +102,7 @@ def compare(name: str, progress: Progress, bsdf: Bsdf, of: str) -> Comparison:
         f"{UNITS} times sample, eval and pdf of {of}",
         Run("mitsuba-cfs", "plugin.sample, plugin.eval_pdf", seconds, processor),
         Run("Radiance", f"{THREADS} x pyradiance.bsdf.sample", peer_seconds, peer_processor),
-        note=f"ours {UNITS / seconds / 1e6:.1f} million a second",
+        note=f"mitsuba-cfs {UNITS / seconds / 1e6:.1f} million a second",
     )
 
 

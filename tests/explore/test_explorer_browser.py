@@ -105,7 +105,8 @@ def test_luminance_and_illuminance_are_those_written(page, run) -> None:
 def test_sliders_move_by_mouse_and_keys(page) -> None:
     before, hour = _picture(page), _hour(page)
     page.drag("#date", 0.2, 0.75)
-    page.until(f"cfs.explorer.now !== {hour}")
+    page.until("cfs.explorer.now === 24 * date.value + Number(window.hour.value)")
+    assert _hour(page) != hour
     moved = _hour(page)
     assert abs(moved // 24 - 0.75 * 364) < 12, "the slider is not where the mouse left it"
     page.press("ArrowRight", 3)
@@ -115,6 +116,18 @@ def test_sliders_move_by_mouse_and_keys(page) -> None:
     page.until(f"cfs.explorer.now === {moved + 71}")
     assert _picture(page) != before
     assert "to" in _text(page, "#hour-now")
+
+
+def test_choices_that_are_overtaken_are_not_computed(page) -> None:
+    """A drag sends more events than hours can be computed: each would delay the next frame."""
+    page.value(
+        "(() => { const { panels } = cfs.explorer, one = panels[0], compute = one.compute; window.computed = [];"
+        "one.compute = function (hour) { computed.push(hour); return compute.call(one, hour); };"
+        "for (let day = 100; day < 150; day++) { date.value = day; date.dispatchEvent(new Event('input')); } })()"
+    )
+    page.until("cfs.explorer.now === 149 * 24 + Number(window.hour.value)")
+    assert page.value("computed.length") <= 3
+    assert page.value("document.getElementById('date-now').textContent") != ""
 
 
 def test_a_click_on_the_carpet_chooses_its_hour(page) -> None:
@@ -212,11 +225,11 @@ def test_patches_of_sun_have_their_true_edges(page, run) -> None:
     """On the floor: what a ray to the sun that leaves by a window reaches, by the triangles."""
     room, hour = run.spaces[0], _bright(page, run)
     page.click("#on-floor")  # the work plane alone is left
-    page.until("cfs.explorer.panels[0].drawing.lit")
     page.value("new Promise((done) => setTimeout(done, 300))")
     points = np.random.default_rng(0).uniform((0.1, 0.1), (4.9, 5.9), (200, 2))
     shown = page.value(
-        "(() => { const d = cfs.explorer.panels[0].drawing, { data, width } = d.lit;"
+        "(() => { const d = cfs.explorer.panels[0].drawing, { width, height } = d.layer;"
+        "const { data } = d.layer.getContext('2d').getImageData(0, 0, width, height);"
         f"return {points.tolist()}.map(([x, y]) => {{ const [u, v] = d.to(x, y).map(Math.floor);"
         "return data[4 * (v * width + u) + 3]; }); })()"
     )
@@ -228,7 +241,8 @@ def test_patches_of_sun_have_their_true_edges(page, run) -> None:
     # a closed blind passes next to nothing of the beam: no patch, as the words say
     page.value("cfs.explorer.found[0].room.arrays.through.fill(1e-7) && hour.dispatchEvent(new Event('input'))")
     page.until("document.querySelector('#one .light').textContent.includes('No direct sun')")
-    assert page.value("!cfs.explorer.panels[0].drawing.lit.data.some((one, i) => i % 4 === 3 && one > 0)")
+    left = "d.layer.getContext('2d').getImageData(0, 0, d.layer.width, d.layer.height).data"
+    assert page.value(f"(d => !{left}.some((one, i) => i % 4 === 3 && one > 0))(cfs.explorer.panels[0].drawing)")
 
 
 def _reached(run, room, point, sun) -> bool:

@@ -213,5 +213,5 @@ def test_rows_under_a_uniform_sky_are_the_quadratures(variant) -> None:
     found, expected = uniform(case), quadrature(case)
     for side, share in (("front", 0.005), ("back", 0.02)):
         judge = expected[f"{side}, quadrature"]
-        assert found[f"{side}, ours"] == pytest.approx(judge, rel=share)
+        assert found[f"{side}, mitsuba-cfs"] == pytest.approx(judge, rel=share)
     assert found["back, pvlib"] > 1.05 * expected["back, quadrature"]

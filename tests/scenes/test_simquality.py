@@ -77,7 +77,7 @@ def test_step_through_walls_is_the_suites() -> None:
     """TF03, boxes without windows: 0.1 K; an interval of 10 minutes is up to 0.25 K of the step."""
     found = simquality.step_response()
     assert len(found) == 20
-    np.testing.assert_allclose(found["ours"], found["suite"], atol=0.1)
+    np.testing.assert_allclose(found["mitsuba-cfs"], found["suite"], atol=0.1)
 
 
 @pytest.mark.slow

@@ -50,7 +50,7 @@ def test_living_room_follows_the_measured_air(written) -> None:
     both = twin_house.compare(folder / experiment.study.name, twin_house.measured(source, experiment)).loc[
         experiment.phases["random heat"]
     ]
-    gap = both["ours"] - both["measured"]
+    gap = both["mitsuba-cfs"] - both["measured"]
     assert len(both) > 2000
     assert np.sqrt((gap**2).mean()) < 1.0
 

@@ -94,7 +94,7 @@ def _row(name: str, output: str, value: float, ranges: dict) -> dict[str, object
 
 def _judged(name: str, output: str, value: float, low: float, high: float) -> dict[str, object]:
     inside = bool(low <= value <= high)
-    return {"case": name, "output": output, "ours": float(value), "low": low, "high": high, "inside": inside}
+    return {"case": name, "output": output, "mitsuba-cfs": float(value), "low": low, "high": high, "inside": inside}
 
 
 def _transmitted_rows(

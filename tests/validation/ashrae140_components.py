@@ -1,4 +1,4 @@
-"""Sun through the shaded window of ASHRAE 140 by its parts: ours traced, and EnergyPlus' own.
+"""Sun through the shaded window of ASHRAE 140 by its parts: traced by mitsuba-cfs, and EnergyPlus' own.
 
     python -m tests.validation ashrae140_components --reference DIR
 

@@ -46,7 +46,7 @@ def figures(name: str, year: ThermalYear) -> dict[str, float]:
 
 
 def compare(reference: Path, folder: Path, only: Sequence[str] = ()) -> pd.DataFrame:
-    """One row per case and output: ours, and the range of the example programs."""
+    """One row per case and output: mitsuba-cfs, and the range of the example programs."""
     ranges, rows = json.loads((reference / RANGES).read_text()), []
     for file in copied(reference, folder):
         if only and file.stem not in only:

@@ -253,7 +253,7 @@ ON_FACADE = "FACADE:Surface Outside Face Incident Solar Radiation Rate per Area"
 IN_PANES = "WINDOW:Surface Window Total Glazing Layers Absorbed Shortwave Radiation Rate"
 THEIR_SUN = {f"{name}:{IN_FACES}": name for name in SUNLIT} | {ON_FACADE: "on facade", IN_PANES: "in panes"}
 TERMS = (  # each in addition to those before
-    "ours",
+    "mitsuba-cfs",
     "EnergyPlus' day of the sun",
     "the sun of the hour held in EnergyPlus' steps",
     "one diffuse value of the window",

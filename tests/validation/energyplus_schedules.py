@@ -2,7 +2,7 @@
 
     python -m tests.validation energyplus_schedules
 
-Table 15's room with clear double glazing, to the south and to the north, in Chicago.  Ours takes
+Table 15's room with clear double glazing, to the south and to the north, in Chicago.  mitsuba-cfs takes
 its hours from the tables of an operation file; EnergyPlus' are its own `Schedule:Compact`.
 """
 

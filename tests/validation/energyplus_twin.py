@@ -77,11 +77,11 @@ def compared(
         )
         return _rows(twin.zones, replace(found, rooms=rooms, results=results), theirs)
 
-    tables = {"ours": _rows(twin.zones, found, theirs)}
+    tables = {"mitsuba-cfs": _rows(twin.zones, found, theirs)}
     if clock:
         start = time.process_time()
         again(list(found.rooms))
-        seconds = {"ours": time.process_time() - start}
+        seconds = {"mitsuba-cfs": time.process_time() - start}
         seconds["E+"] = float((folder / TIME_FILE).read_text().split()[1])
         faces = sum(len(r.zone.surfaces) + len(r.zone.windows) for r in found.rooms)
         tables["processor seconds"] = pd.DataFrame([{"faces": faces} | seconds])
@@ -89,10 +89,10 @@ def compared(
         named = zip(twin.zones, found.rooms, strict=True)
         listed = (folder / "eplusout.eio").read_text()
         tables["sky seen"] = pd.concat([sky_seen(zone, room, listed) for zone, room in named])
-        tables["ours under an open sky"] = again([under_open_sky(room) for room in found.rooms])
+        tables["mitsuba-cfs under an open sky"] = again([under_open_sky(room) for room in found.rooms])
     if their_sun:
         pairs = zip(twin.zones, found.rooms, strict=True)
-        tables["ours with EnergyPlus' sun"] = again([with_their_sun(zone, room, theirs) for zone, room in pairs])
+        tables["mitsuba-cfs with EnergyPlus' sun"] = again([with_their_sun(zone, room, theirs) for zone, room in pairs])
     return tables
 
 

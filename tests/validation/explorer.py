@@ -1,6 +1,6 @@
 """The explorer's DGP and its time for an hour, in headless Chromium, and the size of its folder.
 
-    python -m tests.validation explorer RESULTS [--screenshot FILE.png]
+    python -m tests.validation explorer RESULTS [--load 2] [--screenshot FILE.png]
 
 RESULTS is a folder of `cfs run --explore`.  Judge: this program's rating of its own uncompressed
 pictures in the hours that it drew at random when it wrote the folder, against what the page
@@ -8,12 +8,19 @@ computes and rates; of the times, the browser's clock.  Shared: the view's matri
 and noise, the rule.  Cannot show: whether the pictures are right, which docs/validation.md shows
 elsewhere; the time on a screen: the page is drawn without a GPU.  An hour's time is from the
 slider's event to all that the page draws of it: its codes read from disk where they are not there
-yet, unpacked, made a picture, rated, painted, the plan with its patches of sun.
+yet, unpacked, made a picture, rated, painted, the plan with its patches of sun.  Frames: the times
+between requestAnimationFrame calls while the mouse drags the slider of the date for six seconds,
+with `--load` other processes that never rest.
 """
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -94,6 +101,53 @@ def walked(page: Page, results: Path) -> tuple[WalkedState, ...]:
     return tuple(WalkedState(name, *(np.array(v) for v in values)) for name, *values in found)
 
 
+FRAMES = """(() => {
+  const times = [], shown = new Set();
+  const frame = () => {
+    times.push(performance.now());
+    shown.add(cfs.explorer.now);
+    window.asked = requestAnimationFrame(frame);
+  };
+  frame();
+  window.taken = () => { cancelAnimationFrame(window.asked); return [times, shown.size]; };
+})()"""
+DRAG_S = 6.0
+
+
+@contextmanager
+def loaded(processes: int) -> Iterator[None]:
+    """So many other processes that never rest."""
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(processes)]
+    try:
+        yield
+    finally:
+        for process in busy:
+            process.kill()
+            process.wait()
+
+
+def dragged(page: Page) -> str:
+    """Frames and hours a second while the mouse drags the date of an open explorer."""
+    page.drag("#date", 0.3, 0.7)  # the files of the year's middle are read
+    page.until("cfs.explorer.now === 24 * date.value + Number(window.hour.value)")
+    (start, height), (end, _) = page.place("#date", 0.25), page.place("#date", 0.75)
+    page.mouse("mouseMoved", start, height)
+    page.mouse("mousePressed", start, height)
+    page.value(FRAMES)
+    begun = time.monotonic()
+    while (share := (time.monotonic() - begun) / DRAG_S) < 1:
+        page.mouse("mouseMoved", start + share * (end - start), height, held=True)
+        time.sleep(0.012)
+    times, hours = page.value("window.taken()")
+    page.mouse("mouseReleased", end, height)
+    between = np.diff(times)
+    low, high = np.percentile(between, (50, 95))
+    return (
+        f"dragged: {1000 / between.mean():.0f} frames/s, median {low:.0f} ms, 95 % below {high:.0f} ms, most "
+        f"{between.max():.0f} ms; {1000 * hours / between.sum():.0f} hours/s"
+    )
+
+
 def sizes(results: Path) -> list[str]:
     """A line for each room's view: pixels, hours and bytes on disk."""
     folder = explorer_of(results)
@@ -110,11 +164,13 @@ def sizes(results: Path) -> list[str]:
     return lines
 
 
-def main(results: Path, *, screenshot: Path | None = None) -> None:
-    """Print the sizes, then the hours of each room and state."""
+def main(results: Path, *, load: int = 0, screenshot: Path | None = None) -> None:
+    """Print the sizes, the hours of each room and state, and the frames of a drag."""
     print("\n".join(sizes(results)))
     with tempfile.TemporaryDirectory() as place, Page(Path(place)) as page:
         for state in walked(page, results):
             print(state)
+        with loaded(load):
+            print(dragged(page))
         if screenshot:
             page.screenshot(screenshot)

@@ -155,7 +155,7 @@ def rows() -> Iterator[dict[str, object]]:
             ours = interpolant(paths).matrix(basis)[0]
             seconds = time.process_time() - start
             row = {"sample": sample, **steps, "noise": noise, "seconds": round(seconds, 1)}
-            for name, matrix in (("ours", ours), ("Radiance", by_radiance(paths, Path(folder)))):
+            for name, matrix in (("mitsuba-cfs", ours), ("Radiance", by_radiance(paths, Path(folder)))):
                 share = np.abs(omega @ matrix / (omega @ exact) - 1)[inner].max()
                 light = misplaced(matrix, exact, basis)[inner].max()
                 row |= {f"{name} misplaced": round(float(light), 4), f"{name} share": float(share)}
@@ -171,8 +171,8 @@ def main(*, json_: Path | None = None) -> None:
         found.append(row)
         print(
             f"| {row['sample']} | {row['incident_step_deg']:g}, {row['outgoing_step_deg']:g}"
-            f" | {row['noise']:g} | {row['ours misplaced']:.4f} | {row['Radiance misplaced']:.4f}"
-            f" | {row['ours share']:.4f} | {row['Radiance share']:.4f} |",
+            f" | {row['noise']:g} | {row['mitsuba-cfs misplaced']:.4f} | {row['Radiance misplaced']:.4f}"
+            f" | {row['mitsuba-cfs share']:.4f} | {row['Radiance share']:.4f} |",
             flush=True,
         )
     if json_:

@@ -4,7 +4,7 @@
 
 Rooms of 4 x 4 x 3 m one behind the other, the first 5 m long with a window of 3.0 x 1.8 m, glass of
 3.2 x 2.3 m between two of them; an overcast sky of 20,000 lx.  Illuminance of five sensors of the
-last room: Mitsuba's integrator `path` and Radiance's `rtrace` in all rooms at once, and ours, each
+last room: Mitsuba's integrator `path` and Radiance's `rtrace` in all rooms at once, and mitsuba-cfs, each
 the mean over seeds with its standard error.
 """
 

@@ -5,7 +5,7 @@
 The two rooms of `inner_sun`, empty, with half an air change an hour: the one behind heated to 20
 degC, the front one (room, winter garden, double skin) without heating.  EnergyPlus runs here and
 now.  First in weather without sun: conduction, longwave radiation and air alone.  "one air": both
-rooms as one zone of two spaces, heated to 20 degC; ours by `scenes.heat.air_nodes`.
+rooms as one zone of two spaces, heated to 20 degC; mitsuba-cfs by `scenes.heat.air_nodes`.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ class Coupled:
         return {FRONT_AIR: front.air_c, REAR_AIR: rear.air_c, HEATING: rear.heating / 1000.0}
 
     def with_sun(self, theirs: dict[str, Hours]) -> Coupled:
-        """The rooms with another program's sun [W] in their opaque surfaces; panes keep ours."""
+        """The rooms with another program's sun [W] in their opaque surfaces; panes keep their own."""
         rooms = []
         for number, room in enumerate(self.rooms):
             inside = room.solar.inside.copy()
@@ -197,9 +197,9 @@ def compare(case: str, weather: Path, *, one_air: bool) -> pd.DataFrame:
     """Both programs' mean air temperatures and heating in each week."""
     rooms = coupled_rooms(case, weather, one_air=one_air)
     theirs = energyplus(case, weather, one_air=one_air)
-    programs = {"EnergyPlus": theirs, "ours": rooms.hours()}
+    programs = {"EnergyPlus": theirs, "mitsuba-cfs": rooms.hours()}
     if weather == WEATHER:
-        programs["ours, EnergyPlus' sun"] = rooms.with_sun(theirs).hours()
+        programs["mitsuba-cfs, EnergyPlus' sun"] = rooms.with_sun(theirs).hours()
     rows = []
     for title, week in weeks(WEATHER).items():
         needed = theirs[HEATING][week].sum()

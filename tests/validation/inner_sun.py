@@ -274,10 +274,10 @@ def compare(patch_samples: int, weather: Path, albedo: float) -> pd.DataFrame:
     tables = []
     for case in CASES:
         table = pd.DataFrame(
-            {"ours": ours(case, patch_samples, weather, albedo), "EnergyPlus": energyplus(case, weather, albedo)}
+            {"mitsuba-cfs": ours(case, patch_samples, weather, albedo), "EnergyPlus": energyplus(case, weather, albedo)}
         )
         share = table / table.loc["through the window"] * 100.0
-        table["ours %"], table["EnergyPlus %"] = share["ours"], share["EnergyPlus"]
+        table["mitsuba-cfs %"], table["EnergyPlus %"] = share["mitsuba-cfs"], share["EnergyPlus"]
         table.insert(0, "sun", table.index)
         table.insert(0, "case", case)
         tables.append(table)

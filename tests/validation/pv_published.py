@@ -133,7 +133,7 @@ def main() -> dict[str, pd.DataFrame]:
                 order = np.array_split(np.argsort(up), 6)
                 rest = found.effective[mine][:, columns].sum(axis=1)
                 places.append(
-                    {"day": day, "of": "ours"}
+                    {"day": day, "of": "mitsuba-cfs"}
                     | {name: rest[some].mean() for name, some in zip(backs, order, strict=True)}
                 )
         row["front, Marion"] = table["front"].sum()

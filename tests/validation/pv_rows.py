@@ -4,7 +4,7 @@
 
 Rows of modules above a ground that reflects 0.2, tilted, or upright as the two facades of a street
 seen from both sides.  pvlib's `bifacial.infinite_sheds` has rows without ends, black, and its
-`shading.shaded_fraction1d` the shaded share of a row in every hour.  Ours is `cell_irradiance` of
+`shading.shaded_fraction1d` the shaded share of a row in every hour.  That of mitsuba-cfs is `cell_irradiance` of
 `cfs pv`, for modules in the middle of the middle row; a back is a sheet of its own, 4 cm behind.
 
 Under a uniform sky both are compared with a quadrature in the plane across the rows: the sky that
@@ -160,7 +160,7 @@ def uniform(case: tuple[float, float, float]) -> dict[str, float]:
     for module in modules:
         normals = np.tile(module.normal, (len(module.points), 1))
         matrix = sky_irradiance_matrix(surfaces, module.points, normals, subdivision=2)
-        found[f"{module.guid}, ours"] = matrix.values[:, 1:].sum() / len(normals) / np.pi
+        found[f"{module.guid}, mitsuba-cfs"] = matrix.values[:, 1:].sum() / len(normals) / np.pi
         found[f"{module.guid}, pvlib"] = float(peer[f"poa_{module.guid}"].iloc[0])
     return found
 

@@ -8,7 +8,7 @@ sun; clear glass, and the demo's blind as Klems matrices (`BSDF`) and as tensor 
 Both programs get the sky on the same Reinhart patches and the sun as a disc of 0.533 degrees.
 rpict renders 16 pixels for each of the picture's.  Radiance's Ev is rtrace's, of a point and
 without an ambient cache; its DGP is that of rpict's glare sources with this Ev (evalglare's `-i`),
-ours of the picture alone.
+that of mitsuba-cfs of the picture alone.
 """
 
 from __future__ import annotations

@@ -79,7 +79,7 @@ def compare(reference: Path, folder: Path = STUDIES, only: Sequence[str] = ()) -
                     "variant": number,
                     "azimuth": suite["Azimuth [Deg]"],
                     "altitude": suite["Altitude [Deg]"],
-                    "ours": sunlit_share(read_study(file))[interval],
+                    "mitsuba-cfs": sunlit_share(read_study(file))[interval],
                     "suite": suite[column],
                     "low": low[column],
                     "high": high[column],
@@ -87,7 +87,7 @@ def compare(reference: Path, folder: Path = STUDIES, only: Sequence[str] = ()) -
             )
         )
     table = pd.concat(rows, ignore_index=True)
-    table["inside"] = table["ours"].between(table["low"], table["high"])
+    table["inside"] = table["mitsuba-cfs"].between(table["low"], table["high"])
     return table
 
 
@@ -100,7 +100,7 @@ def step_response(folder: Path = STUDIES) -> pd.DataFrame:
         start = air.index[0].normalize() + pd.Timedelta(days=STEP_DAY)
         since = (air.index - start) / pd.Timedelta(hours=1)  # middles of the intervals
         ours = np.interp(STEP_HOURS, since, air)
-        rows.append(pd.DataFrame({"variant": number, "hours": STEP_HOURS, "ours": ours, "suite": theirs}))
+        rows.append(pd.DataFrame({"variant": number, "hours": STEP_HOURS, "mitsuba-cfs": ours, "suite": theirs}))
     return pd.concat(rows, ignore_index=True)
 
 

@@ -170,7 +170,7 @@ def compare(study: Path, data: pd.DataFrame) -> pd.DataFrame:
     """Ours and the measured air [degC]."""
     (year,), _ = run_study(read_study(study), silent)
     ends = year.hours.index + pd.Timedelta(minutes=5)
-    both = pd.DataFrame({"ours": year.hours["air_c"].to_numpy()}, index=ends)
+    both = pd.DataFrame({"mitsuba-cfs": year.hours["air_c"].to_numpy()}, index=ends)
     return both.join(data["living"].rename("measured"), how="inner")
 
 
@@ -219,14 +219,14 @@ def by_phase(experiment: Experiment, study: Path, data: pd.DataFrame, held: pd.S
     rows = []
     for name, times in experiment.phases.items():
         part = both.loc[times]
-        gap, daily = part["ours"] - part["measured"], part.resample("D").max()
+        gap, daily = part["mitsuba-cfs"] - part["measured"], part.resample("D").max()
         rows.append(
             {
                 "phase": name,
                 "intervals": len(part),
                 "RMSE [K]": np.sqrt((gap**2).mean()),
                 "bias [K]": gap.mean(),
-                "daily maxima [K]": (daily["ours"] - daily["measured"]).mean(),
+                "daily maxima [K]": (daily["mitsuba-cfs"] - daily["measured"]).mean(),
                 "heat to hold [W]": held.loc[times].mean(),
                 "heater [W]": data.loc[times, "heater"].mean(),
             }

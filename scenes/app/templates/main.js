@@ -125,6 +125,7 @@ function go() {
   page.step = STEPS.includes(name) ? name : "files";
   page.show();
   byId(page.step).querySelector("h2")?.focus({ preventScroll: true });
+  document.querySelector("nav [aria-current]").scrollIntoView({ block: "nearest", inline: "nearest" }); // on a phone
   scrollTo({ top: 0, behavior: "instant" });
 }
 

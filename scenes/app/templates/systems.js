@@ -9,6 +9,8 @@ const sheetText = (sheet) => [
   ["τv", fixed(sheet.tau_v, 2)], ["g", fixed(sheet.g_value, 2)], ["U", `${fixed(sheet.u_value, 2)} W/(m² K)`], ["τe", fixed(sheet.tau_e, 2)]];
 const sheetList = (sheet) => h("dl", { class: "sheet" }, sheetText(sheet).map(([name, value]) => h("div", {}, h("dt", {}, name), h("dd", {}, value))));
 
+const sentence = (text) => `${text.slice(0, 1).toUpperCase()}${text.slice(1)}.`;
+
 const save = (systems) => page.change({ systems });
 
 function named(system) {
@@ -26,8 +28,8 @@ function drawChosen() {
     const file = system.bsdf || system.operation, sheet = sheets[file];
     return h("li", { class: "card" }, named(system),
       sheet ? sheetList(sheet) : null,
-      h("p", { class: "soft" }, sheet?.source ? `${sheet.source}. ` : "",
-        system.operation ? gettext("moves between the states of {file}", { file: fileOf(file) }) : fileOf(file)),
+      h("p", { class: "soft" }, sheet?.source ? `${sentence(sheet.source)} ` : "",
+        system.operation ? gettext("Moves between the states of {file}.", { file: fileOf(file) }) : fileOf(file)),
       h("button", { type: "button", class: "quiet", "data-key": `leave ${system.name}`, "aria-label": gettext("Remove {name}", { name: system.name }), onclick: () => save(systems.filter((one) => one !== system)) }, gettext("Remove")));
   }));
 }

@@ -5,7 +5,9 @@
   const byId = (id) => document.getElementById(id);
   const PLAY = 200; // [ms] an hour at least
   const explorer = { rooms: [], variants: [], panels: [], playing: false };
-  let turn = 0; // of the update under way; an older one is dropped
+  let turn = 0; // of the latest choice
+  let updating = null; // while the page follows the choices
+  const frame = () => new Promise((on) => { requestAnimationFrame(() => setTimeout(on)); });
 
   async function start() {
     const data = await cfs.load("case");
@@ -91,20 +93,44 @@
     return { colours: byId("colours").value, high: Number(byId("high").value), outline: byId("outline").checked, planes, palette: explorer.palette };
   }
 
-  async function update() {
-    const mine = ++turn, day = Number(byId("date").value), clock = Number(byId("hour").value), hour = day * 24 + clock;
-    const both = byId("compare").checked;
-    document.body.classList.toggle("both", both);
+  // Show what is chosen: the picture first, glare and plan in the next frames, so that a slider moves
+  // smoothly while it is dragged; of choices that come faster than they are computed, the latest is shown
+  function update() {
+    turn++;
+    sayTime();
+    updating ||= (async () => {
+      try {
+        for (let last = 0; last !== turn;) { last = turn; await show(); }
+      } finally {
+        updating = null;
+      }
+    })();
+    return updating;
+  }
+
+  function sayTime() {
+    const day = Number(byId("date").value), clock = Number(byId("hour").value);
     byId("date-now").textContent = explorer.calendar.words(day);
     byId("hour-now").textContent = gettext("{start}:00 to {end}:00", { start: clock, end: clock + 1 });
     byId("hour").setAttribute("aria-valuetext", byId("hour-now").textContent);
     byId("date").setAttribute("aria-valuetext", byId("date-now").textContent);
+  }
+
+  async function show() {
+    const day = Number(byId("date").value), clock = Number(byId("hour").value), hour = day * 24 + clock;
+    const both = byId("compare").checked;
+    document.body.classList.toggle("both", both);
     const shown = explorer.panels.slice(0, both ? 2 : 1), found = [];
-    for (const panel of shown) found.push(await panel.compute(hour)); // one scan may serve both
-    if (mine !== turn) return;
+    for (const panel of shown) found.push(await panel.compute(hour)); // arrays of one state are shared
     const suns = found.map((f) => Array.from(f.room.arrays.sun.subarray(3 * hour, 3 * hour + 3)));
-    const lit = found.find((f) => f.l !== undefined), curve = lit ? cfs.toneCurve(lit.values) : () => 0;
-    shown.forEach((panel, i) => panel.paint(found[i], hour, day, look(), suns[i], curve));
+    const lit = found.find((f) => f.l !== undefined), toned = lit && ["seen", "true"].includes(look().colours);
+    const curve = toned ? cfs.toneCurve(lit.values) : () => 0;
+    shown.forEach((panel, i) => panel.paintPicture(found[i], look(), curve));
+    explorer.pictured = hour;
+    await frame();
+    for (const [i, panel] of shown.entries()) panel.rate(found[i]);
+    await frame();
+    shown.forEach((panel, i) => panel.paintRest(found[i], hour, day, look(), suns[i]));
     paintDifference(found);
     sayHour(found[0], suns[0], lit);
     paintCarpet(found[0], day, clock);

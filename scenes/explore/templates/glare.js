@@ -12,6 +12,8 @@
       this.ny = fisheye.height;
       this.luminance = new Float64Array(this.nx * this.ny);
       this.labels = new Int32Array(this.nx * this.ny);
+      this.listed = new Int32Array(this.nx * this.ny);
+      this.bright = this.listed.subarray(0, 0); // pixels above the threshold, in scan order: all that have labels
       this.boxes = new Int32Array(0);
     }
 
@@ -85,18 +87,18 @@
 
     sumSources(size) {
       this.sums = new Float64Array(size * SUMS);
-      this.labels.forEach((label, at) => { if (label > 0) this.addPixel(label, at, 1); });
+      for (const at of this.bright) if (this.labels[at] > 0) this.addPixel(this.labels[at], at, 1);
     }
 
     boxesOf() {
       const { nx, ny, labels } = this, boxes = new Int32Array(this.sums.length / SUMS * 4);
       for (let i = 0; i < boxes.length; i += 4) { boxes[i] = nx; boxes[i + 1] = -1; boxes[i + 2] = ny; boxes[i + 3] = -1; }
-      labels.forEach((label, at) => {
-        if (label <= 0) return;
-        const x = Math.floor(at / ny), y = at % ny, b = label * 4;
+      for (const at of this.bright) {
+        if (labels[at] <= 0) continue;
+        const x = Math.floor(at / ny), y = at % ny, b = labels[at] * 4;
         boxes[b] = Math.min(boxes[b], x); boxes[b + 1] = Math.max(boxes[b + 1], x);
         boxes[b + 2] = Math.min(boxes[b + 2], y); boxes[b + 3] = Math.max(boxes[b + 3], y);
-      });
+      }
       return boxes;
     }
 
@@ -134,18 +136,18 @@
 
     mergeSources(radius, reach, lowest, highest, edges) {
       if (highest <= lowest) return;
-      const { nx, ny, labels, eye } = this, cosine = Math.cos(Math.min(radius / 2, Math.PI)), boxes = this.boxesOf();
+      const { ny, labels, eye } = this, cosine = Math.cos(Math.min(radius / 2, Math.PI)), boxes = this.boxesOf();
       let changed = true;
       while (changed) {
         changed = false;
-        for (let x = 0; x < nx; x++) {
-          for (let y = 0; y < ny; y++) {
-            const at = x * ny + y, own = labels[at];
-            if (own < lowest || !eye.valid[at] || (edges && this.inside(x, y))) continue;
-            if (!this.largerInReach(boxes, x, y, own, lowest, highest, reach)) continue;
-            const now = this.search(x, y, radius, cosine, reach, own, lowest, highest);
-            if (now > 0) { this.moveSource(boxes, own, now); changed = true; }
-          }
+        for (const at of this.bright) {
+          const own = labels[at];
+          if (own < lowest || !eye.valid[at]) continue;
+          const x = Math.floor(at / ny), y = at % ny;
+          if (edges && this.inside(x, y)) continue;
+          if (!this.largerInReach(boxes, x, y, own, lowest, highest, reach)) continue;
+          const now = this.search(x, y, radius, cosine, reach, own, lowest, highest);
+          if (now > 0) { this.moveSource(boxes, own, now); changed = true; }
         }
       }
     }
@@ -173,7 +175,7 @@
     peaksOf(source, first, radius) {
       const { ny, labels, luminance, eye } = this, cosine = Math.cos(Math.min(radius / 2, Math.PI));
       let last = first - 1;
-      for (let at = 0; at < labels.length; at++) {
+      for (const at of this.bright) {
         if (labels[at] !== source || luminance[at] < PEAK || !eye.valid[at]) continue;
         let label = 0;
         if (last >= first) label = this.searchPeak(Math.floor(at / ny), at % ny, radius, cosine, first, last);
@@ -187,7 +189,10 @@
 
     extractPeaks(count, radius, reach) {
       const brightest = new Float64Array(count + 1);
-      this.labels.forEach((label, at) => { if (label > 0) brightest[label] = Math.max(brightest[label], this.luminance[at]); });
+      for (const at of this.bright) {
+        const label = this.labels[at];
+        if (label > 0) brightest[label] = Math.max(brightest[label], this.luminance[at]);
+      }
       let last = count;
       for (let source = 1; source <= count; source++) {
         if (this.sums[source * SUMS] > 0 && brightest[source] >= PEAK) {
@@ -203,7 +208,7 @@
       const step = eye.pixelsIn(RADIUS), reach = eye.reach(radius / 2);
       const count = this.labelBright(radius, reach, step > 1);
       let bright = 0;
-      if (step >= 1 && count) for (const l of luminance) if (l >= PEAK) bright++;
+      if (step >= 1 && count) for (const at of this.bright) if (luminance[at] >= PEAK) bright++;
       this.sumSources(count + 1 + bright);
       if (step > 1) this.mergeSources(radius, reach, 1, count, true);
       if (bright) this.extractPeaks(count, radius, reach);
@@ -216,7 +221,7 @@
         found.push({ luminance: flux / omega, solidAngle: omega, x, y, position: eye.positionIndex(way) });
         numbers[l] = found.length;
       }
-      labels.forEach((label, at) => { if (label) labels[at] = numbers[label]; });
+      for (const at of this.bright) if (labels[at]) labels[at] = numbers[labels[at]];
       return found;
     }
 
@@ -233,6 +238,9 @@
         Ev += eye.projected[at] * value;
         if (value > largest) largest = value;
       }
+      let count = 0;
+      for (let at = 0; at < luminance.length; at++) if (luminance[at] > THRESHOLD) this.listed[count++] = at;
+      this.bright = this.listed.subarray(0, count);
       const sources = this.sources();
       for (const disc of discs) {
         Ev += disc.luminance * disc.solidAngle * cfs.dot(disc.direction, eye.frame.forward);

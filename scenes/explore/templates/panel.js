@@ -31,9 +31,8 @@
       const variant = this.variant, room = await variant.room();
       const state = room.stateOf(variant.state, hour), l = room.number.get(hour);
       if (l === undefined) return { room, state, variant };
-      const [rated, lux] = await Promise.all([room.rated(state, l), room.illuminance(state, l)]);
-      const found = { room, state, variant, l, lux, ...rated, labels: rated.glare.labels.slice() };
-      for (const name of ["values", "ofBeam", "ofWindow"]) found[name] = rated[name].slice();
+      const [picture, lux] = await Promise.all([room.picture(state, l), room.illuminance(state, l)]);
+      const found = { room, state, variant, l, lux, ...picture };
       if (room.coloured) {
         found.tints = room.tints(state, l);
         found.melanopic = await room.illuminance(state, l, true);
@@ -42,13 +41,22 @@
       return found;
     }
 
-    // look: {colours, high, outline, planes, palette}; curve: shared by the panels side by side
-    paint(found, hour, day, look, sun, curve) {
+    // Glare of what was computed; the rooms' states share a scan, whose labels are of the last picture
+    rate(found) {
+      if (found.l === undefined) return;
+      Object.assign(found, found.room.rate(found));
+      found.labels = found.glare.labels.slice();
+    }
+
+    // The picture, without its glare; look: {colours, high, outline, planes, palette}; curve: shared
+    // by the panels side by side
+    paintPicture(found, look, curve) {
       this.found = found;
-      const { room, state } = found, view = room.facts.view, canvas = this.at("eye"), pen = canvas.getContext("2d");
-      canvas.width = view.width;
-      canvas.height = view.height;
-      if (found.l !== undefined) {
+      const { room } = found, view = room.facts.view, canvas = this.at("eye"), pen = canvas.getContext("2d");
+      if (canvas.width !== view.width) canvas.width = view.width;
+      if (canvas.height !== view.height) canvas.height = view.height;
+      if (found.l === undefined) pen.clearRect(0, 0, view.width, view.height);
+      else {
         const { pixels } = room.arrays;
         const inFalse = (values) => cfs.falseColour(view, pixels, values, look.palette, look.high / 1000, look.high);
         let picture;
@@ -56,8 +64,17 @@
         else if (look.colours === "true" && found.tints) picture = cfs.trueColour(view, pixels, found, found.tints, curve);
         else if (look.colours === "melanopic" && found.tints) picture = inFalse(cfs.melanopic(found, found.tints));
         else picture = inFalse(found.values);
-        if (look.outline) cfs.outlines(picture, found.labels);
         pen.putImageData(picture, 0, 0);
+        this.picture = picture;
+      }
+    }
+
+    // Glare, plan and temperatures
+    paintRest(found, hour, day, look, sun) {
+      const { room, state } = found;
+      if (found.l !== undefined && look.outline) {
+        cfs.outlines(this.picture, found.labels);
+        this.at("eye").getContext("2d").putImageData(this.picture, 0, 0);
       }
       this.say(found);
       this.drawing ||= null;

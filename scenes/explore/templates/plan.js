@@ -14,8 +14,11 @@
     frame() {
       const [west, south, east, north] = this.plan.bounds, width = east - west + 2 * MARGIN, height = north - south + 2 * MARGIN;
       const across = Math.max(this.canvas.clientWidth, 120) * Math.min(devicePixelRatio || 1, 2), scale = across / width;
-      this.canvas.width = this.layer.width = Math.round(across);
-      this.canvas.height = this.layer.height = Math.round(height * scale);
+      const size = [Math.round(across), Math.round(height * scale)];
+      for (const canvas of [this.canvas, this.layer]) { // a canvas that gets a size anew is made anew
+        if (canvas.width === size[0] && canvas.height === size[1]) canvas.getContext("2d").clearRect(0, 0, ...size);
+        else [canvas.width, canvas.height] = size;
+      }
       this.canvas.style.aspectRatio = `${width} / ${height}`;
       this.scale = scale;
       this.to = (x, y) => [(x - west + MARGIN) * scale, (north + MARGIN - y) * scale];
@@ -54,7 +57,6 @@
         for (const name of sun.planes) {
           cfs.sunPatch(this.layer, room, sun.direction, plan.heights[name], this.to, SUN[name]);
           pen.drawImage(this.layer, 0, 0);
-          if (name === "desk") this.lit = this.layer.getContext("2d").getImageData(0, 0, this.layer.width, this.layer.height);
         }
       }
       pen.strokeStyle = ink;

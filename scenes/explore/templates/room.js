@@ -64,13 +64,22 @@
       return this.groups.map((triangles, g) => ({ triangles, through: this.arrays.through[(state * this.G + g) * this.L + l] }));
     }
 
-    // Luminance picture and glare of a lit hour; times in milliseconds
+    // Luminance picture of a lit hour; times in milliseconds, the whole with decompression
+    async picture(state, l) {
+      const pictures = await this.pictures(state), begun = performance.now(), picture = await pictures.picture(l);
+      return { ...picture, wholeMilliseconds: performance.now() - begun };
+    }
+
+    // Glare of a picture
+    rate(picture) {
+      const begun = performance.now(), glare = this.scan.rate(picture.values, picture.discs), milliseconds = performance.now() - begun;
+      return { glare, glareMilliseconds: milliseconds, wholeMilliseconds: picture.wholeMilliseconds + milliseconds };
+    }
+
+    // Picture and glare of a lit hour
     async rated(state, l) {
-      const pictures = await this.pictures(state), begun = performance.now();
-      const picture = await pictures.picture(l), start = performance.now();
-      const glare = this.scan.rate(picture.values, picture.discs);
-      const end = performance.now();
-      return { ...picture, glare, glareMilliseconds: end - start, wholeMilliseconds: end - begun };
+      const picture = await this.picture(state, l);
+      return { ...picture, ...this.rate(picture) };
     }
   }
   cfs.Room = Room;
