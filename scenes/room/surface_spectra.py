@@ -86,7 +86,7 @@ def in_stated_colours(space: Space, tables: Sequence[SurfaceTable]) -> Space:
         hue = next(found, None)
         return part if hue is None else replace(part, hue=hue)
 
-    faces, furniture = (tuple(map(coloured, parts)) for parts in (space.faces, space.furniture))
+    faces, furniture = tuple(map(coloured, space.faces)), tuple(map(coloured, space.furniture))
     return replace(space, faces=faces, furniture=furniture)
 
 
