@@ -29,6 +29,7 @@ from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight, picture_light
 from scenes.room.options import Outputs
 from scenes.room.picture_hours import hour_index
+from scenes.room.surface_spectra import in_stated_colours
 from scenes.room.windows import RoomWindows
 
 COLUMNS = {
@@ -249,9 +250,10 @@ def coloured(
     building = in_month(room.building, int(room.weather.midpoints[hour].month))
     sampling = room.options.sampling
     sky = annual_sky(room.weather, sampling.subdivision, hours=[hour], **room.options.sky)
+    space = in_stated_colours(room.space, () if room.operation is None else room.operation.surface)
     result = with_colour(
         glare,
-        band_scenes(building, room.space, groups, glare.view),
+        band_scenes(building, space, groups, glare.view),
         room.windows.optics_by_colour(light.light.systems[: len(groups)]),
         sky,
         state=state[hour].tolist(),

@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from fnmatch import fnmatch
 from functools import cache
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from bim.colours import GREY
+from bim.colours import GREY, Colour
 from bim.model import FACE_KINDS, Element, Face, Space
-from mitsuba_cfs.bsdf.colour import reflectance_of_colour, with_visible
+from mitsuba_cfs.bsdf.colour import reflectance_of_colour, relative_rgb, with_visible
 from mitsuba_cfs.notes import Note
-from mitsuba_cfs.spectra.detectors import NANOMETRES
+from mitsuba_cfs.spectra.detectors import NANOMETRES, illuminant, sensitivities
 from scenes.fenestration.thermal_file import read_reflectance, reflectance_of_code
 from scenes.toml_file import TomlTable
 
 FloatArray = NDArray[np.float64]
+Part = TypeVar("Part", Face, Element)
 GROUND = "ground"  # outdoors, as a table selects it
 
 
@@ -73,6 +75,26 @@ def materials() -> dict[str, FloatArray]:
 def ground_reflectance(tables: Sequence[SurfaceTable]) -> FloatArray | None:
     """Reflectance of the ground outdoors [N], of any scale; None: neutral."""
     return next((table.shape() for table in tables if table.select == GROUND), None)
+
+
+def in_stated_colours(space: Space, tables: Sequence[SurfaceTable]) -> Space:
+    """The room whose surfaces and furniture have the hues under D65 of the tables that select them."""
+    hues = [_hue(table.shape()) for table in tables]
+
+    def coloured(part: Part) -> Part:
+        found = (hue for table, hue in zip(tables, hues, strict=True) if table.select != GROUND and table.selects(part))
+        hue = next(found, None)
+        return part if hue is None else replace(part, hue=hue)
+
+    faces, furniture = tuple(map(coloured, space.faces)), tuple(map(coloured, space.furniture))
+    return replace(space, faces=faces, furniture=furniture)
+
+
+def _hue(reflectance: FloatArray) -> Colour:
+    """Linear sRGB of luminance 1 of a reflectance [N] under D65."""
+    observer = illuminant("D65")[:, None] * sensitivities()[-3:].T
+    red, green, blue = relative_rgb(*(reflectance @ (observer / observer.sum(axis=0)))).tolist()
+    return red, green, blue
 
 
 def room_reflectance(

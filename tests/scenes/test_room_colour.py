@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +20,9 @@ from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.sky.annual import annual_sky
 from scenes.result_folder import ResultFolder
 from scenes.results import GlareResults, LuminancePicture
+from scenes.room import glare
 from scenes.room.glare import brightest_picture, with_colour
+from scenes.room.surface_spectra import SurfaceTable, in_stated_colours
 from scenes.room.windows import in_all_windows, room_windows
 from scenes.run.outputs import write_results
 from tests.report.synthetic import run_result
@@ -67,6 +71,31 @@ def test_the_brightest_picture_keeps_its_luminance_and_gets_the_rooms_colours(va
     # walls left and right of the view; between them ceiling above and floor below
     side, grey = pixels[14:18, 3:5], coloured(ROOM, weather, (glass,)).colour.radiance[14:18, 3:5]
     assert np.median(side[..., 0] / side[..., 2]) > 3 * np.median(grey[..., 0] / grey[..., 2])
+
+
+def test_stated_colours_of_surfaces_are_in_the_picture(variant, weather, glass) -> None:
+    windows = room_windows(ROOM, in_all_windows(ROOM, glass))
+    options = SimpleNamespace(sampling=SMALL.sampling, sky={})
+    light: Any = SimpleNamespace(light=SimpleNamespace(systems=windows.optics()))
+    state = np.zeros((len(weather.midpoints), len(windows.groups)), dtype=np.int64)
+    seen = []
+    for tables in ((), (SurfaceTable(select="wall", colour="#b04a3a"),)):
+        operation = SimpleNamespace(surface=tables)
+        room: Any = SimpleNamespace(
+            building=BOX, space=ROOM, windows=windows, weather=weather, options=options, operation=operation
+        )
+        side = glare.coloured(room, light, state, pictures()).colour.radiance[14:18, 3:5]
+        seen.append(np.median(side[..., 0] / side[..., 2]))
+    assert seen[1] > 3 * seen[0]
+
+
+def test_a_stated_colour_is_the_hue_of_its_surfaces_alone() -> None:
+    tables = SurfaceTable(select="wall", colour="#b04a3a"), SurfaceTable(select="ground", colour="#00ff00")
+    red = hue_of([((v / 255 + 0.055) / 1.055) ** 2.4 for v in (0xB0, 0x4A, 0x3A)])
+    for before, after in zip(ROOM.faces, in_stated_colours(ROOM, tables).faces, strict=True):
+        # the smooth spectrum of the colour ends at 380 and 780 nm
+        assert after.hue == (pytest.approx(red, rel=0.02) if before.kind == "wall" else before.hue)
+        assert after.reflectance("visible") == before.reflectance("visible")
 
 
 def test_the_hours_shading_state_holds(variant, weather, glass, milk) -> None:

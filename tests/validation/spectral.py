@@ -59,7 +59,7 @@ SKY_AND_GROUND = (
 )
 ALTITUDE, AZIMUTH = 35.0, 170.0  # of the sun [degrees], from north by east
 BANDS = 20  # of each run of the peer, whose build has at most 24
-RANGES = 4  # of 100 nm each, a run of the peer for each
+RANGES = 4  # of 100 nm each, a run of the peer for each; 1 is enough where no pane is coloured
 GAP = 1e-4  # between panes [m]: what leaves a wider one past its rim has met the inner panes alone
 # Diffuse reflectances of the room's faces that are not neutral
 ROOMS: dict[str, dict[str, NDArray[np.float64]]] = {
@@ -76,6 +76,11 @@ ROOMS: dict[str, dict[str, NDArray[np.float64]]] = {
 POINTS = np.array([[2.0, 3.0, 0.8], [2.0, 3.0, 1.2], [2.0, 3.0, 1.2]])
 NORMALS = np.array([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
 EVERY_5_NM = Channels(tuple(np.arange(380.0, 781.0, 5.0).tolist()))  # as the peer's
+HEADER = (
+    "| panes | sky | point | EDI [lx] | Radiance | difference % | DER | difference % "
+    "| CCT, difference [K] | [1/MK] | u'v' |",
+    "|---|---|---|---|---|---|---|---|---|---|---|",
+)
 NAMES = ("desk", "eye towards the window", "eye along the window")
 
 
@@ -111,7 +116,7 @@ def coloured_blind(colour: str) -> tuple[KlemsBsdf, SlatLight]:
     options: dict[str, Any] = {
         **dict.fromkeys(names),
         **dict.fromkeys(("thickness_mm", "specular", "roughness", "cull"), 0.0),
-        **{"basis": "full", "tensor_tree": None, "isotropic": False, "paths": 32_768, "seed": 0, "name": ""},
+        **{"basis": "full", "tensor_tree": None, "isotropic": False, "paths": 131_072, "seed": 0, "name": ""},
         **BLIND,
     }
     file, _, light = generated_file(sheet_colour=colour, shape="venetian", **options)
@@ -141,22 +146,20 @@ class Light:
 def main(
     *,
     data: Path = Path("../shared/data/bsdf/products_spectral"),
-    bounces: int = 8,
+    bounces: int = 20,
     divisions: int = 5000,
     repeats: int = 4,
     only: str = "",
     sky: str = "",
     room: str = "neutral",
+    parts: int = RANGES,
 ) -> str:
     """The tables of docs/evidence_daylight.md; only: of one of `WINDOWS`; sky: of one; room: one of `ROOMS`.
 
-    Windows whose files are not in the folder of data are left out.
+    Windows whose files are not in the folder of data are left out.  parts: ranges of wavelength of
+    the peer, of 20 bands each.
     """
-    rows = [
-        "| panes | sky | point | EDI [lx] | Radiance | difference % | DER | difference % "
-        "| CCT, difference [K] | [1/MK] | u'v' |",
-        "|---|---|---|---|---|---|---|---|---|---|---|",
-    ]
+    rows = [*HEADER]
     for name, (files, _) in WINDOWS.items():
         if only not in ("", name) or not all((data / file).exists() for file in files):
             continue
@@ -164,12 +167,12 @@ def main(
         for kind in ("overcast", "sun"):
             if sky in ("", kind):
                 own = ours(window, kind, room)
-                peers = radiances(window, kind, bounces, divisions, room, repeats)
-                rows += [f"| {name} | {kind} | {point} | {_compared(own, peers, s)} |" for s, point in enumerate(NAMES)]
+                peers = radiances(window, kind, bounces, divisions, room, repeats, parts)
+                rows += [f"| {name} | {kind} | {point} | {compared(own, peers, s)} |" for s, point in enumerate(NAMES)]
     return "\n".join(rows)
 
 
-def _compared(own: Light, peers: Light, s: int) -> str:
+def compared(own: Light, peers: Light, s: int) -> str:
     """Cells of a point s: of the peer the mean of its repeats, with that mean's standard error.
 
     Args: peers: of the points, repeat after repeat.
@@ -254,7 +257,9 @@ def photopic_light(window: Window, sky: AnnualSky, scene: DaylightScene) -> Phas
     return light
 
 
-def radiances(window: Window, kind: str, bounces: int, divisions: int, room: str, repeats: int = 1) -> Light:
+def radiances(
+    window: Window, kind: str, bounces: int, divisions: int, room: str, repeats: int = 1, parts: int = RANGES
+) -> Light:
     """Radiance's: spectra as its own primitives, each pane a `glass`, the fabric a `trans`, slats `plastic`.
 
     Of the points, repeat after repeat, whose random numbers differ.
@@ -264,23 +269,29 @@ def radiances(window: Window, kind: str, bounces: int, divisions: int, room: str
         folder = Path(name)
         lines = "".join(" ".join(f"{v:g}" for v in (*p, *n)) + "\n" for p, n in zip(POINTS, NORMALS, strict=True))
         lines *= repeats
-        options = f"-u+ -I+ -h -ab {bounces} -aa 0 -ad {divisions} -as 0 -lw 1e-7 -dj 0 -dc 1 -dt 0 -cs {BANDS} -co+"
-        for low, high in ranges():
+        options = f"{peer_options(bounces, divisions)} -cs {BANDS} -co+"
+        for low, high in ranges(parts):
             peer_scene(folder, window, kind, room, (low, high))
             command = f"rtrace {options} -cw {low:g} {high:g} scene.oct"
             text = run(command, folder, lines.encode()).decode()
             values = np.array([[float(v) for v in line.split()] for line in text.splitlines()])
             if values[0].size != BANDS:
                 raise ValueError(f"rtrace gave {values[0].size} values a point")
-            power.append(values[:, ::-1] * 400.0 / RANGES / BANDS)
+            power.append(values[:, ::-1] * 400.0 / parts / BANDS)
     # a spectrum of 1 has 179 lm/W in Radiance
     flat = detected(np.ones(len(NANOMETRES)))[0]
-    return Light.of(np.concatenate(power, axis=1) @ EVERY_5_NM.detection.T * 179.0 / flat)
+    channels = Channels(tuple(np.linspace(380.0, 780.0, parts * BANDS + 1).tolist()))
+    return Light.of(np.concatenate(power, axis=1) @ channels.detection.T * 179.0 / flat)
 
 
-def ranges() -> list[tuple[float, float]]:
+def peer_options(bounces: int, divisions: int) -> str:
+    """Options of `rtrace`: paths of its own that end by chance alone."""
+    return f"-u+ -I+ -h -ab {bounces} -aa 0 -ad {divisions} -as 0 -lr -{3 * bounces} -lw 1e-7 -dj 0 -dc 1 -dt 0"
+
+
+def ranges(parts: int = RANGES) -> list[tuple[float, float]]:
     """Ends of the peer's ranges of wavelength [nm]."""
-    ends = np.linspace(380.0, 780.0, RANGES + 1).tolist()
+    ends = np.linspace(380.0, 780.0, parts + 1).tolist()
     return list(pairwise(ends))
 
 
@@ -289,38 +300,48 @@ def peer_scene(folder: Path, window: Window, kind: str, room: str, nm: tuple[flo
     scene, reflectance = room_scene(room)
     (folder / "room.rad").write_text(_surfaces(scene.interior, reflectance), "utf-8")
     (folder / "pane.cal").write_text(PANE_CAL, "utf-8")
-    azimuth = AZIMUTH - 180.0  # gendaylit's: west of south
-    beam, diffuse = (0.0, 200.0) if kind == "overcast" else (800.0, 50.0)
-    made = run(f"gendaylit -ang {ALTITUDE} {azimuth} -W {beam} {diffuse}", folder).decode()
-    (folder / "sky.rad").write_text(_sky(made, kind, window.panes), "utf-8")
+    (folder / "sky.rad").write_text(_sky(perez_sky(folder, kind), kind, window.panes), "utf-8")
     (folder / "glass.rad").write_text(_glass(scene, window, *nm, gap), "utf-8")
-    (folder / "blind.rad").write_text("" if window.slats is None else _blind(scene, window.slats), "utf-8")
+    blind = "" if window.slats is None else blind_of(scene, _coloured_paint(window.slats))
+    (folder / "blind.rad").write_text(blind, "utf-8")
     run("oconv sky.rad room.rad glass.rad blind.rad > scene.oct", folder)
 
 
-def _blind(scene: DaylightScene, colour: str) -> str:
-    """Slats as `plastic` outdoors, and a black facade, which sends no light to them."""
+def blind_polygons(scene: DaylightScene) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The facade round the window and the slats outside it, corners of rectangles [n, 4, 3] each."""
     corners = np.concatenate([each.triangles for each in scene.groups[0].windows]).reshape(-1, 3)
     (left, front, low), (right, _, high) = corners.min(axis=0), corners.max(axis=0)
     west, east, bottom, top = left - BLIND_BEYOND, right + BLIND_BEYOND, low - BLIND_BEYOND, high + BLIND_BEYOND
-    parts = [_spectrum("paint", reflectance_of_code(colour)), "paint plastic slat\n0\n0\n5 1 1 1 0 0\n"]
-    parts.append("void plastic black\n0\n0\n5 0 0 0 0 0\n")
     sides = [
         (west, bottom, left, top),
         (right, bottom, east, top),
         (left, bottom, right, low),
         (left, high, right, top),
     ]
-    for i, (a, b, c, d) in enumerate(sides):
-        y = front - 10 * GAP
-        parts.append(polygon("black", f"facade{i}", np.array([[a, y, b], [c, y, b], [c, y, d], [a, y, d]])))
+    y = front - 10 * GAP
+    facade = [[[a, y, b], [c, y, b], [c, y, d], [a, y, d]] for a, b, c, d in sides]
     depth, step = BLIND["depth_mm"] / 1000, BLIND["spacing_mm"] / 1000
     tilt, y = np.radians(BLIND["tilt_deg"]), front - BLIND_BEHIND
     dy, dz = 0.5 * depth * np.cos(tilt), 0.5 * depth * np.sin(tilt)
-    for i, z in enumerate(np.arange(bottom, top, step)):
-        ends = [[west, y - dy, z - dz], [east, y - dy, z - dz], [east, y + dy, z + dz], [west, y + dy, z + dz]]
-        parts.append(polygon("slat", f"slat{i}", np.array(ends)))
+    slats = [
+        [[west, y - dy, z - dz], [east, y - dy, z - dz], [east, y + dy, z + dz], [west, y + dy, z + dz]]
+        for z in np.arange(bottom, top, step)
+    ]
+    return np.array(facade), np.array(slats)
+
+
+def blind_of(scene: DaylightScene, paint: str) -> str:
+    """Slats of a `plastic` outdoors, and a black facade, which sends no light to them."""
+    facade, slats = blind_polygons(scene)
+    parts = [paint, "void plastic black\n0\n0\n5 0 0 0 0 0\n"]
+    parts += [polygon("black", f"facade{i}", corners) for i, corners in enumerate(facade)]
+    parts += [polygon("slat", f"slat{i}", corners) for i, corners in enumerate(slats)]
     return "\n".join(parts)
+
+
+def _coloured_paint(colour: str) -> str:
+    """The `plastic` of slats of a colour."""
+    return _spectrum("paint", reflectance_of_code(colour)) + "\npaint plastic slat\n0\n0\n5 1 1 1 0 0\n"
 
 
 def _surfaces(surfaces: Surfaces, reflectance: NDArray[np.float64]) -> str:
@@ -347,29 +368,46 @@ def _spectrum(name: str, values: NDArray[np.float64]) -> str:
     return f"void spectrum {name}\n0\n0\n{len(values) + 2} 380 780 {text}\n"
 
 
-def _unit(spectrum: NDArray[np.float64]) -> NDArray[np.float64]:
+def unit(spectrum: NDArray[np.float64]) -> NDArray[np.float64]:
     """A spectrum with the luminance of a flat one of 1."""
     return spectrum * detected(np.ones(len(NANOMETRES)))[0] / detected(spectrum)[0]
 
 
-def _sky(made: str, kind: str, panes: Sequence[SpectralPane]) -> str:
-    """The sky of `gendaylit`, coloured; the overcast sky, or the sun alone.
+def perez_sky(folder: Path, kind: str) -> str:
+    """The grey sky of `gendaylit`: the overcast sky, or the sun alone."""
+    (folder / "sky.cal").write_text(SKY_CAL, "utf-8")
+    azimuth = AZIMUTH - 180.0  # gendaylit's: west of south
+    beam, diffuse = (0.0, 200.0) if kind == "overcast" else (800.0, 50.0)
+    made = run(f"gendaylit -ang {ALTITUDE} {azimuth} -W {beam} {diffuse}", folder).decode()
+    text = "\n".join(line for line in made.splitlines() if not line.startswith("#"))
+    start = text.index("void brightfunc skyfunc")
+    if kind == "overcast":
+        return f"{text[start:].replace('skybright perezlum', 'above sky')}\n{SKY_AND_GROUND}"
+    return text[:start]
+
+
+def _sky(grey: str, kind: str, panes: Sequence[SpectralPane]) -> str:
+    """A sky of `perez_sky`, coloured.
 
     Shadow rays of Radiance do not go to and fro between panes: the sun's spectrum has that share.
     """
-    overcast = _unit(daylight_shares(OVERCAST_K) @ daylight_components())
+    if kind == "overcast":
+        overcast = unit(daylight_shares(OVERCAST_K) @ daylight_components())
+        return f"{_spectrum('day', overcast)}\n{grey.replace('void brightfunc', 'day brightfunc')}"
     cosine = np.cos(np.radians(ALTITUDE)) * np.cos(np.radians(AZIMUTH - 180.0))
     alone = [spectral_transmittance([pane], NANOMETRES, np.arccos(cosine))[0] for pane in panes]
     together = spectral_transmittance(panes, NANOMETRES, np.arccos(cosine))[0]
     share = together / np.maximum(np.prod(alone, axis=0), 1e-9)
-    sun = _unit(sun_spectra(np.sin(np.radians(ALTITUDE)))[0]) * share
-    lines = [line for line in made.splitlines() if not line.startswith("#")]
-    text = "\n".join(lines)
-    start = text.index("void brightfunc skyfunc")
-    if kind == "overcast":
-        sky = text[start:].replace("void brightfunc", "day brightfunc")
-        return f"{_spectrum('day', overcast)}\n{sky}\n{SKY_AND_GROUND}"
-    return _spectrum("beam", sun) + text[:start].replace("void light", "beam light")
+    sun = unit(sun_spectra(np.sin(np.radians(ALTITUDE)))[0]) * share
+    return _spectrum("beam", sun) + grey.replace("void light", "beam light")
+
+
+# perezlum.cal mixes sky and ground near the horizon, where slats let light pass; here each ends there
+SKY_CAL = """{ diffuse normalization, ground, coefficients of the Perez model, direction of the sun }
+above = if(Dz, A1 * (1 + A3*exp(A4/if(Dz - .01, Dz, .01))) * (1 + A5*exp(A6*gamma) + A7*cosgamma*cosgamma), A2);
+cosgamma = Dx*A8 + Dy*A9 + Dz*A10;
+gamma = acos(if(cosgamma - 1, 1, cosgamma));
+"""
 
 
 # Radiance multiplies the spectrum of a `glass` into its transmittance whatever the angle: only the
