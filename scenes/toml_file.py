@@ -79,6 +79,20 @@ def validated(model: type[T], table: dict[str, Any], path: Path) -> T:
         raise DataError(_message(first, model) + more, file=path, field=field) from error
 
 
+def check_kinds(model: type[BaseModel], table: Mapping[str, Any], path: Path) -> None:
+    """`DataError` for the first value of a table that is of another kind than the model's.
+
+    Keys that are missing, and values out of their range, pass: the table may be incomplete.
+    """
+    try:
+        model.model_validate(table)
+    except ValidationError as error:
+        for fault in error.errors(include_url=False):
+            if fault["type"].endswith("_type"):
+                field = ".".join(map(str, fault["loc"]))
+                raise DataError(_message(fault, model), file=path, field=field) from error
+
+
 def tables_of(annotation: object) -> Iterator[type[BaseModel]]:
     """The models inside a type: its own, in its alternatives, entries or values."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):

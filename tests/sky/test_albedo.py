@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from mitsuba_cfs.errors import DataError
@@ -142,3 +143,32 @@ def test_gaps_are_counted_in_hours_and_snow_needs_temperatures(weather):
     np.testing.assert_allclose(halves.albedo, 0.3)
     bare = replace(snowed(weather), dry_bulb_c=None)
     assert with_albedo(bare, None) is bare
+
+
+def test_snow_of_half_hours_is_counted_in_hours(weather):
+    """100 steps of half an hour are 50 hours, for which there is no note; 200 are 100."""
+
+    def half(values):
+        return np.repeat(values, 2)
+
+    day = weather.direct_normal + weather.diffuse_horizontal > 0
+    steps = np.flatnonzero(half(day))
+    ends = weather.times[0] + pd.Timedelta(minutes=30) * (np.arange(17520) - 1)
+    for count, noted in ((100, False), (198, False), (200, True)):
+        depth = np.zeros(17520)
+        depth[steps[:count]] = 5.0
+        direct, diffuse = half(weather.direct_normal), half(weather.diffuse_horizontal)
+        fine = replace(weather, times=ends, step_h=0.5, direct_normal=direct, diffuse_horizontal=diffuse, notes=())
+        cold = replace(fine, dry_bulb_c=np.full(17520, -1.0), snow_depth_cm=depth)
+        assert bool(with_albedo(cold, None).notes) == noted
+
+
+def test_rain_is_the_epws_liquid_precipitation(tmp_path):
+    """N33 of the data dictionary [mm]; N34 beside it is the hours that it fell in."""
+    lines = WEATHER.read_text(encoding="latin-1").splitlines()
+    rows = [line.split(",") for line in lines[8:]]
+    for i, row in enumerate(rows):
+        row[33:35] = ["7.5" if i < 10 else "0", "1"]
+    path = tmp_path / "city.epw"
+    path.write_text("\n".join([*lines[:8], *map(",".join, rows)]) + "\n", encoding="latin-1")
+    np.testing.assert_allclose(read_epw(path).rain_mm[:11], [7.5] * 10 + [0.0])

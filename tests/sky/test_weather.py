@@ -405,6 +405,7 @@ weather_data_file_units {unit}
         ("1 1 1.5 0 0\n1 1 0.5 0 0\n", ("line 8", "out of order")),
         ("1 1 0.5 0 0\n1 1 1.5 0 0\n", ("8760 or 8784", "2 rows")),
         ("2 30 0.5 0 0\n", ("line 7", "not a date")),
+        ("1 1 24.5 0 0\n", ("line 7", "not a date")),
     ],
 )
 def test_wea_faults(tmp_path, rows, words):
