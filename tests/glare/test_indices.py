@@ -242,8 +242,7 @@ def test_angles_of_unit_vectors_are_numbers():
     for along, up in random.normal(size=(300, 2, 3)):
         view = fisheye((0.0, 0.0, 0.0), along, 64, up=up / np.linalg.norm(up))
         _, across, forward = frame(view)
-        sigma, _, below = view_angles(forward, view)
-        assert sigma == pytest.approx(0.0, abs=1e-7) and not below
+        assert view_angles([forward], view)[0] == pytest.approx(0.0, abs=1e-7)
         above = np.cos(0.3) * forward + np.sin(0.3) * across  # tau is 0 where the given up is across the view
-        sigma, tau, below = view_angles(above, fisheye((0.0, 0.0, 0.0), along, 64, up=across))
+        (sigma,), (tau,), (below,) = view_angles([above], fisheye((0.0, 0.0, 0.0), along, 64, up=across))
         assert sigma == pytest.approx(0.3) and tau == pytest.approx(0.0, abs=1e-6) and not below

@@ -153,12 +153,12 @@ def test_snow_of_half_hours_is_counted_in_hours(weather):
 
     day = weather.direct_normal + weather.diffuse_horizontal > 0
     steps = np.flatnonzero(half(day))
-    ends = weather.times[0] + pd.Timedelta(minutes=30) * (np.arange(17520) - 1)
+    ends = pd.date_range(weather.times[0] - pd.Timedelta(minutes=30), periods=17520, freq="30min")
     for count, noted in ((100, False), (198, False), (200, True)):
         depth = np.zeros(17520)
         depth[steps[:count]] = 5.0
-        direct, diffuse = half(weather.direct_normal), half(weather.diffuse_horizontal)
-        fine = replace(weather, times=ends, step_h=0.5, direct_normal=direct, diffuse_horizontal=diffuse, notes=())
+        series = {name: half(getattr(weather, name)) for name in weather.series()}
+        fine = replace(weather, **series | {"times": ends, "step_h": 0.5, "notes": ()})
         cold = replace(fine, dry_bulb_c=np.full(17520, -1.0), snow_depth_cm=depth)
         assert bool(with_albedo(cold, None).notes) == noted
 

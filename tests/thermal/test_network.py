@@ -373,7 +373,7 @@ def test_a_resistance_is_the_same_in_every_form():
     loads = []
     for kind, coefficients in forms.items():
         glass = Fenestration("pane", 1 / (constant + films), resistance=LayerResistance(kind, coefficients))
-        room = box(window=glass, outside="adiabatic", loads=IdealLoads(20.0, 20.0))
+        room = box(window=glass, outside="adiabatic", infiltration_ach=0.0, loads=IdealLoads(20.0, 20.0))
         result = simulate(room, climate(24, outdoor=2.0), no_sun(24, 6, 1), options=OPTIONS)
         loads.append(float((result.heating - result.cooling)[-1]))
     glass, wall = 4.5 / (constant + films), 7.5 / (films + INSULATION.resistance + CONCRETE.resistance)
