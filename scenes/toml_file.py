@@ -21,6 +21,7 @@ from mitsuba_cfs.files import reason
 T = TypeVar("T", bound=BaseModel)
 Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
+Key = Annotated[str, Field(max_length=200)]  # a path of keys, as "box.window.0.width"
 
 # What is wrong with a value, by pydantic's name of the fault; its `ctx` fills the braces
 WANTED = {
@@ -31,6 +32,7 @@ WANTED = {
     "too_short": "at least {min_length} entries",
     "too_long": "at most {max_length} entries",
     "string_too_short": "a text that is not empty",
+    "string_too_long": "a text of at most {max_length} characters",
     "finite_number": "a finite number",
     "literal_error": "{expected}",
 }
@@ -225,6 +227,8 @@ def set_key(table: Any, parts: list[str], value: Any, *, made: bool) -> None:
         for one in table:
             set_key(one, parts, value, made=made)
         return
+    if not isinstance(table, dict):
+        raise DataError(f"there is no table to set {first!r} in, but {_shown(table)}")
     if not rest:
         table[first] = value
         return
