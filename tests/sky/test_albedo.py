@@ -161,14 +161,3 @@ def test_snow_of_half_hours_is_counted_in_hours(weather):
         fine = replace(weather, **series | {"times": ends, "step_h": 0.5, "notes": ()})
         cold = replace(fine, dry_bulb_c=np.full(17520, -1.0), snow_depth_cm=depth)
         assert bool(with_albedo(cold, None).notes) == noted
-
-
-def test_rain_is_the_epws_liquid_precipitation(tmp_path):
-    """N33 of the data dictionary [mm]; N34 beside it is the hours that it fell in."""
-    lines = WEATHER.read_text(encoding="latin-1").splitlines()
-    rows = [line.split(",") for line in lines[8:]]
-    for i, row in enumerate(rows):
-        row[33:35] = ["7.5" if i < 10 else "0", "1"]
-    path = tmp_path / "city.epw"
-    path.write_text("\n".join([*lines[:8], *map(",".join, rows)]) + "\n", encoding="latin-1")
-    np.testing.assert_allclose(read_epw(path).rain_mm[:11], [7.5] * 10 + [0.0])
