@@ -372,7 +372,7 @@ def test_a_building_is_no_option_of_a_command(project) -> None:
     """A stranger's study file names `--html=FILE` as its building, which `cfs check` would write."""
     study = project.folder / "study.toml"
     study.write_text('[[room]]\nname = "a"\nbuilding = "--html=../../page.html"\n')
-    with pytest.raises(DataError, match="room.building: expected a file of a building"):
+    with pytest.raises(DataError, match=r"room\.building: expected a file of a building"):
         actions.check(project)
 
 
