@@ -177,15 +177,11 @@ def lamp_spectrum(source: str) -> FloatArray:
 
 def _spdx(path: Path) -> tuple[FloatArray, FloatArray]:
     """Wavelengths [nm] and powers of a file of IES TM-27."""
+    ((root, _),) = xml_elements(path, None, depth=1, most_bytes=SPDX_BYTES)
+    words = [(item.get("wavelength", ""), item.text or "") for item in root.iter("SpectralData")]
     try:
-        rows = [
-            (float(item.attrib["wavelength"]), float(item.text or ""))
-            for root, _ in xml_elements(path, None, depth=1, most_bytes=SPDX_BYTES)
-            for item in root.iter("SpectralData")
-        ]
-    except (KeyError, ValueError) as error:
-        if isinstance(error, DataError):
-            raise
+        rows = [(float(wavelength), float(power)) for wavelength, power in words]
+    except ValueError as error:
         raise DataError(f"is no spectrum of IES TM-27 (SPDX): {error}", file=path) from None
     if not rows:
         raise DataError("is no spectrum of IES TM-27 (SPDX): no SpectralData", file=path)
