@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 
 from numba import njit
 from numba.core.caching import IndexDataCacheFile
@@ -68,3 +70,20 @@ def must_compile(function: Callable) -> bool:
         return False
     file = getattr(function._cache, "_cache_file", None)  # none where nothing can be kept
     return file is None or not file.cached()
+
+
+@contextmanager
+def alone_in_compiling(function: Callable) -> Iterator[None]:
+    """Wait until no other process is in this context with a compiled function, and keep others out of it.
+
+    Who finds that a function must be compiled waits here for the process that is at it, and then
+    loads its code.  What is locked is the function's own source file: nothing is written, and the
+    system lets go of it with the process.  Where files cannot be locked, nobody waits.
+    """
+    with open(function.__code__.co_filename, "rb") as source:
+        if sys.platform != "win32":
+            import fcntl
+
+            with suppress(OSError):
+                fcntl.flock(source, fcntl.LOCK_EX)
+        yield

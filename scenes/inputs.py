@@ -156,6 +156,7 @@ def inputs_of(
         *(() if operation is None else ground_note(operation.tables)),
         *_state_notes(options, operation, filled, systems, building),
         *(() if operation is None else tilt_note(operation.systems)),
+        *unused_rules(tables, filled),
     )
     building = traced_building(building, systems)
     weather = with_albedo(files.weather, options.albedo)
@@ -215,6 +216,15 @@ def _unstated(
     if used is None:
         return unstated_note(heat_of, building)
     return unstated_note(OperationTables(), building, used.file.name)
+
+
+def unused_rules(tables: OperationTables | None, systems: Systems) -> tuple[str, ...]:
+    """A sentence where rules are stated for windows that have one state each."""
+    if tables is None or not systems or any(len(states) > 1 for states in systems.values()):
+        return ()
+    if not any("control" in one.model_fields_set for one in (tables, *tables.rooms)):
+        return ()
+    return (Note("Every window has one state: the rules of [control] have no effect."),)
 
 
 def _state_notes(

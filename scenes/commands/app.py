@@ -8,10 +8,11 @@ from pathlib import Path
 import click
 
 from mitsuba_cfs.errors import DataError
+from scenes.commands.examples import StrictCommand
 from scenes.commands.served_page import port_fault, served_page_options
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @click.argument("project", type=click.Path(file_okay=False, path_type=Path), default=Path("cfs-project"))
 @served_page_options("also of the reports that it asks for")
 def command(project: Path, port: int, language: str, no_browser: bool) -> None:

@@ -6,10 +6,11 @@ from pathlib import Path
 
 import click
 
+from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import size_option
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @size_option("size", 300, "costs are scaled to those of a study")
 @click.option(
     "--out",

@@ -11,6 +11,7 @@ import click
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, write_table, write_text
+from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import check_is_ifc, input_options, no_cache_option
 from scenes.input_options import InputOptions
 
@@ -24,7 +25,7 @@ UNCHANGED = (), False, ()  # rooms to join, furniture, storeys: as the building 
 UNCUT = 100_000  # columns of a table that nobody sees
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @input_options("all", weather="", system=False, glazing=False)
 @click.option("--csv", "issues", type=click.Path(path_type=Path), help="Also write the problems to a CSV file.")
 @click.option(

@@ -9,6 +9,7 @@ import click
 
 from bim.report.issue import issue_text
 from scenes import quick as quick_run
+from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import (
     FILE,
     PrintedHead,
@@ -55,7 +56,7 @@ def list_rules(context: click.Context, _: click.Parameter, value: bool) -> None:
     context.exit()
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @click.option(
     "--list",
     is_flag=True,

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
+from scenes.commands.examples import StrictCommand
 from scenes.commands.study import study_to_folder
 from scenes.demo import STUDY
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @click.option(
     "--out", default="cfs-demo", show_default=True, type=click.Path(path_type=Path), help="Folder of results."
 )

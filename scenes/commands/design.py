@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import (
     FILE,
     chosen_language,
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from scenes.study.store import Store
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @click.argument("design", type=FILE, metavar="DESIGN.toml")
 @out_folder_option
 @processes_option

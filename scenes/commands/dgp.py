@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from scenes import quick
+from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import (
     PrintedHead,
     chosen_language,
@@ -31,7 +32,7 @@ from scenes.year_of_glare.options import METHODS, METRICS, YearOptions
 _DEFAULT = YearOptions(Path(), Path())
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @input_options("the first with a window", several=False, weather="demo")
 @out_folder_option
 @view_option("views", "or a file of views", several=True)

@@ -14,13 +14,14 @@ import click
 
 from mitsuba_cfs import llvm
 from mitsuba_cfs.interpreter import own_paths, own_python
+from scenes.commands.examples import StrictCommand
 
 PROGRAM = "mitsuba-cfs"
 PEERS = {"pyradiance": "Radiance", "pyenergyplus-lbnl": "EnergyPlus", "pywincalc": "WINDOW"}
 TIME_LIMIT = 120  # seconds for the self-test; it takes two
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 def command() -> None:
     """Print versions, LLVM libraries, the chosen Mitsuba variant, peer programs; run a self-test.
 

@@ -1,7 +1,8 @@
-"""The help of a group of commands: examples of each command, and the names near an unknown one."""
+"""Commands: examples in their help, the names near an unknown one, options that are given once."""
 
 from __future__ import annotations
 
+from collections import Counter
 from difflib import get_close_matches
 
 import click
@@ -100,8 +101,23 @@ def with_examples(command: click.Command, name: str) -> click.Command:
     return command
 
 
+class StrictCommand(click.Command):
+    """A command that refuses an option given twice; click would take the last without a word."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """As click's."""
+        given = Counter(self.make_parser(ctx).parse_args(list(args))[2])
+        for option, times in given.items():
+            several = not isinstance(option, click.Option) or option.multiple or option.count or option.is_flag
+            if times > 1 and not several:
+                ctx.fail(f"{option.opts[-1]} is given {times} times and takes one value.")
+        return super().parse_args(ctx, args)
+
+
 class CommandGroup(click.Group):
     """A group whose error about an unknown command names those that are near."""
+
+    command_class = StrictCommand
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

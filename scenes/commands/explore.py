@@ -9,12 +9,13 @@ from pathlib import Path
 import click
 
 from mitsuba_cfs.files import read_json, scratch_folder
+from scenes.commands.examples import StrictCommand
 from scenes.commands.served_page import port_fault, served_page_options
 
 RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @click.argument("results", type=RESULTS, nargs=-1, required=True, metavar="RESULTS...")
 @click.option("--out", type=click.Path(path_type=Path), help="Write one folder that opens as a file, and exit.")
 @served_page_options("results of a run state none")

@@ -14,6 +14,7 @@ import click
 
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.files import check_file
+from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import (
     FILE,
     PrintedHead,
@@ -37,7 +38,7 @@ PATTERNS = {  # of the files that an export writes
 }
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @input_options("all", weather="", system=False)
 @click.option(
     "--radiance",

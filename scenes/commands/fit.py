@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 
 import click
 
+from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import FILE, chosen_language, out_folder_option, page_option
 
 if TYPE_CHECKING:
     from scenes.fit.fit import FitResult
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @click.argument("fit", type=FILE, metavar="FIT.toml")
 @out_folder_option
 @page_option

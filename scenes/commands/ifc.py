@@ -11,7 +11,7 @@ import click
 from mitsuba_cfs.files import check_file, json_text, write_text
 from mitsuba_cfs.progress import Stage
 from scenes.commands.check import command as check
-from scenes.commands.examples import CommandGroup
+from scenes.commands.examples import CommandGroup, StrictCommand
 from scenes.commands.export import command as export
 from scenes.commands.room_options import FILE, IFC_FILE, out_folder_option, space_option, u_option
 from scenes.result_folder import ResultFolder
@@ -21,7 +21,7 @@ out_option = click.option(
 )
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @click.option(
     "--out",
     required=True,

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from mitsuba_cfs.files import check_file
+from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import (
     PrintedHead,
     eye_height_option,
@@ -21,7 +22,7 @@ from scenes.commands.room_options import (
 from scenes.picture_options import SUFFIXES, PictureOptions
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @input_options("the first with a window", several=False, weather="demo")
 @click.option(
     "--at",

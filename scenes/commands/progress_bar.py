@@ -216,8 +216,8 @@ COMPILE = "from scenes.commands.progress_bar import compile_now; compile_now()"
 def compiled_beside() -> Iterator[None]:
     """Compile the heat balance in another process meanwhile, if it is not compiled yet.
 
-    That process stores the compiled code in this process's cache; if it is late or fails, this
-    process compiles.
+    That process stores the compiled code in this process's cache; this process waits for it where
+    it needs the code (`alone_in_compiling`), and compiles itself if the other failed.
     """
     from mitsuba_cfs.compiled import must_compile
     from thermal.kernel import advance
@@ -234,17 +234,28 @@ def compiled_beside() -> Iterator[None]:
 
 
 def compile_now() -> None:
-    """Compile the heat balance and the glare of a picture by computing the smallest of each."""
+    """Compile the glare of a picture, glazing, comfort and the heat balance by computing the smallest of each."""
     import numpy as np
 
+    from mitsuba_cfs.compiled import alone_in_compiling
     from mitsuba_cfs.glare.evaluation import evaluate
     from mitsuba_cfs.images.view import fisheye
     from thermal.balance import simulate
     from thermal.climate import Climate, no_sun
+    from thermal.comfort import pmv_ppd, standard_effective_temperature
+    from thermal.glazing_unit import GlazingLayer, GlazingUnit
+    from thermal.iso15099 import NFRC, unit_balance
+    from thermal.kernel import advance
     from thermal.zone import Layer, OpaqueSurface, Zone
 
     day, up = np.zeros(24), np.array([0.0, 0.0, 1.0])
     roof = OpaqueSurface("roof", 10.0, (Layer(0.1, 1.0, 1000.0, 1000.0),), up)
     climate = Climate(day, day, day, day, day, day + 101325.0)
-    simulate(Zone("room", 30.0, (roof,)), climate, no_sun(24, 1, 0))
-    evaluate(np.ones((64, 64), dtype=np.float32), fisheye((0, 0, 0), (0, 1, 0), 64))
+    picture = np.ones((64, 64), dtype=np.float32)
+    picture[30:34:2, 30:34:2] = 1e5  # four sources that are one
+    with alone_in_compiling(advance):  # in the order in which a room needs them
+        evaluate(picture, fisheye((0, 0, 0), (0, 1, 0), 64))
+        unit_balance(GlazingUnit((GlazingLayer(0.006, 0.8),)), NFRC[0])
+        simulate(Zone("room", 30.0, (roof,)), climate, no_sun(24, 1, 0))
+        pmv_ppd(day, day)
+        standard_effective_temperature(day, day)

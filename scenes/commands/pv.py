@@ -9,6 +9,7 @@ import click
 
 from bim.report.issue import COLUMNS, issue_rows
 from scenes import quick as quick_run
+from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import (
     FILE,
     PrintedHead,
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from scenes.result_folder import ResultFolder
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @input_options("", system=False, glazing=False)
 @click.option("--study", "study_file", required=True, type=FILE, help="TOML file of the system; see docs/pv.md.")
 @out_folder_option

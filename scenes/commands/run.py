@@ -11,6 +11,7 @@ import click
 
 from mitsuba_cfs.methods import METHODS
 from scenes import quick as quick_run
+from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import (
     FILE,
     PrintedHead,
@@ -71,7 +72,7 @@ class Percentage(click.ParamType):
         return share
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @input_options("all with a window")
 @room_options
 @spectral_option

@@ -10,6 +10,7 @@ import click
 
 from bim.report.issue import issue_text
 from scenes import quick as quick_run
+from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import (
     FILE,
     PrintedHead,
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     from scenes.study.study_file import Study
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @click.argument("study", type=FILE, metavar="STUDY.toml")
 @out_folder_option
 @processes_option

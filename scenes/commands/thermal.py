@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import FILE
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ from scenes.commands.room_options import (
 )
 
 
-@click.command()
+@click.command(cls=StrictCommand)
 @click.argument("study", type=FILE, metavar="STUDY.toml")
 @out_folder_option
 @click.option("--figures", is_flag=True, help="Write a figure of each room's year as SVG.")

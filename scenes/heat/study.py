@@ -34,7 +34,7 @@ from scenes.heat.box import building_or_box
 from scenes.heat.design_days import design_loads
 from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.study_file import StudyFile
-from scenes.inputs import Inputs, every_state, inputs_of
+from scenes.inputs import Inputs, every_state, inputs_of, unused_rules
 from scenes.results import ShadingYear
 from scenes.room.heat import felt_by, room_humidity, step_issues
 from scenes.room.inputs import room_inputs, skies_for
@@ -622,5 +622,5 @@ def study_inputs(study: StudyFile, files: HeatFiles | None = None, progress: Pro
     rooms = "all" if study.couple or study.box is not None else "glazed"
     inputs = inputs_of(building, options, files.inputs, rooms=rooms, states=every_state, tables=study)
     notes = *stated_note(building, "the study"), *unstated_note(study, building, "the study")
-    inputs = replace(inputs, notes=(*notes, *ground_note(study)))
+    inputs = replace(inputs, notes=(*notes, *ground_note(study), *unused_rules(study, inputs.filled)))
     return replace(inputs, spaces=shared_constructions(inputs.spaces)) if study.couple else inputs

@@ -14,7 +14,7 @@ from bim.defaults import FILMS
 from bim.model import Building, Face, Space, Window
 from bim.outer_faces import OuterFaces, outer_faces
 from bim.to_thermal import ThermalRoom, coupled_rooms, door_links, surface_neighbours, thermal_room
-from mitsuba_cfs.compiled import must_compile
+from mitsuba_cfs.compiled import alone_in_compiling, must_compile
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache, cached_or_computed
 from mitsuba_cfs.notes import Note
@@ -373,6 +373,8 @@ def balances(
     """
     if must_compile(advance):
         progress(COMPILING, 0.0)
+        with alone_in_compiling(advance):  # by a process that began earlier: `compiled_beside`
+            pass
     passed = iter if store is None else store.each
     zones, suns = [r.zone for r in rooms], [per_window(r.solar, r.zone) for r in passed(rooms)]
     row_s, outdoors = 3600.0 * weather.step_h, climate(weather)

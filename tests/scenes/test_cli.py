@@ -112,6 +112,8 @@ def test_debugging_shows_the_traceback_of_a_users_mistake(failing, monkeypatch) 
     ("arguments", "line"),
     [
         (("doktor",), "cfs: No such command 'doktor'"),
+        (("run", "a.ifc", "--cfs", "a.xml", "--cfs", "b.xml"), "cfs run: --cfs is given 2 times and takes one value."),
+        (("bsdf", "plot", "a.xml", "--out", "a.png", "--out", "b.png"), "cfs bsdf plot: --out is given 2 times"),
         (("doctor", "--loud"), "cfs doctor: No such option"),
         (("doctor", "now"), "cfs doctor: Got unexpected extra argument"),
     ],

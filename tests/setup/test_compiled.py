@@ -190,3 +190,62 @@ def test_the_heat_balance_is_compiled_once(tmp_path) -> None:
             [sys.executable, "-c", BALANCE], env=environment, cwd=REPOSITORY, capture_output=True, text=True, check=True
         )
         assert ran.stdout.strip() == said
+
+
+HOLDER = """
+import time
+from mitsuba_cfs.compiled import alone_in_compiling
+from tests.setup.test_compiled import entry_of_a_test
+with alone_in_compiling(entry_of_a_test):
+    print("holds", flush=True)
+    time.sleep(60)
+"""
+WAITER = """
+from mitsuba_cfs.compiled import alone_in_compiling
+from tests.setup.test_compiled import entry_of_a_test
+print("asks", flush=True)
+with alone_in_compiling(entry_of_a_test):
+    print("passes", flush=True)
+"""
+
+
+def entry_of_a_test() -> None:
+    """Its source file is what two processes lock."""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="files are locked by fcntl")
+def test_who_must_compile_waits_for_a_process_that_is_at_it_as_long_as_this_lives() -> None:
+    def start(code: str) -> subprocess.Popen:
+        return subprocess.Popen([sys.executable, "-c", code], cwd=REPOSITORY, stdout=subprocess.PIPE, text=True)
+
+    with start(HOLDER) as holder:
+        assert holder.stdout is not None and holder.stdout.readline() == "holds\n"
+        with start(WAITER) as waiter:
+            assert waiter.stdout is not None and waiter.stdout.readline() == "asks\n"
+            with pytest.raises(subprocess.TimeoutExpired):
+                waiter.wait(timeout=1.0)
+            holder.kill()
+            assert waiter.communicate(timeout=60)[0] == "passes\n"
+
+
+COMPILED_BESIDE = """
+from mitsuba_cfs.compiled import must_compile
+from mitsuba_cfs.glare import passes, scan
+from thermal.kernel import advance
+from thermal.layer_balance import settle
+print(*map(must_compile, (advance, settle, passes.gather, scan.search, scan.merge_sources)))
+"""
+
+
+@pytest.mark.slow  # half a minute of compilation
+def test_the_process_beside_compiles_what_a_room_needs(tmp_path) -> None:
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+
+    def run(code: str) -> str:
+        return subprocess.run(
+            [sys.executable, "-c", code], env=environment, cwd=REPOSITORY, capture_output=True, text=True, check=True
+        ).stdout.strip()
+
+    assert run(COMPILED_BESIDE) == "True True True True True"
+    run("from scenes.commands.progress_bar import compile_now; compile_now()")
+    assert run(COMPILED_BESIDE) == "False False False False False"
