@@ -84,7 +84,7 @@ from tests.scenes.test_measured_weather import table_of as measured_table
 from tests.thermal.test_study import study_file as thermal_file
 
 QUICK, SLOW = 40, 20_000
-SILENT = ("mark", "case of a study")  # results of this program that are then computed again
+SILENT = ("mark", "case of a study", "journal")  # what is then computed again, or a line that is left out
 DEMO = WEATHER.parent
 ROOM = """void plastic white
 0 0 5 .7 .7 .7 0 0
