@@ -17,10 +17,14 @@ DEEPEST = 100  # elements within each other
 CHUNK = 1 << 20  # bytes parsed at once
 
 
-def xml_elements(path: Path, root: str, *, depth: int, most_bytes: int) -> Iterator[tuple[ElementTree.Element, int]]:
+def xml_elements(
+    path: Path, root: str | None, *, depth: int, most_bytes: int
+) -> Iterator[tuple[ElementTree.Element, int]]:
     """The elements of a depth (1: the root) with their lines; what was yielded is not kept.
 
     Names of elements and attributes are without namespaces.
+
+    Args: root: its name; None: any.
 
     Raises: `DataError` for a file that cannot be read, is no XML, has another root, declares
     entities, is bigger or more deeply nested than what is read.
@@ -49,7 +53,7 @@ def xml_elements(path: Path, root: str, *, depth: int, most_bytes: int) -> Itera
 class _Reader:
     """A parser that builds the elements of one depth."""
 
-    def __init__(self, path: Path, root: str, depth: int) -> None:
+    def __init__(self, path: Path, root: str | None, depth: int) -> None:
         self.path, self.root, self.depth = path, root, depth
         self.level, self.line = 0, 0
         self.builder = ElementTree.TreeBuilder()
@@ -70,7 +74,7 @@ class _Reader:
         if self.level > DEEPEST:
             line = self.parser.CurrentLineNumber
             raise DataError(f"line {line}: elements nested too deeply", file=self.path)
-        if self.level == 1 and _local(name) != self.root:
+        if self.level == 1 and self.root not in (None, _local(name)):
             message = f"expected {self.root}, got {_local(name)[:40]}"
             raise DataError(message, file=self.path)
         if self.level == self.depth:

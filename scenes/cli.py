@@ -134,7 +134,9 @@ class _StderrHandler(logging.Handler):
     """Writes to the stderr of the moment, which a progress bar may have redirected."""
 
     def emit(self, record: logging.LogRecord) -> None:
-        click.echo(f"{record.levelname.lower()}: {self.format(record)}", err=True)
+        debug = logging.getLogger().isEnabledFor(logging.DEBUG)  # else the message, without a traceback
+        text = self.format(record) if debug else record.getMessage()
+        click.echo(f"{record.levelname.lower()}: {text}", err=True)
 
 
 def _print_version(ctx: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
@@ -172,6 +174,7 @@ def cfs(verbose: int, device: str, progress: str) -> None:
     logging.basicConfig(level=level, format="%(message)s", handlers=[_StderrHandler()], force=True)
     for noisy in ("matplotlib", "numba", "h5py", "PIL"):
         logging.getLogger(noisy).setLevel(logging.WARNING)
+    logging.getLogger("trimesh").setLevel(logging.ERROR)  # it warns of normals that are not needed
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

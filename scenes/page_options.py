@@ -126,7 +126,7 @@ def _logo_uri(logo: Path, path: Path) -> str:
                 raise fault(f"has {width} x {height} pixels; at most {LOGO_PIXELS} a side")
             picture.load()
             return bytes_uri(content, f"image/{str(picture.format).lower()}")
-    except (OSError, SyntaxError) as error:  # SyntaxError: Pillow's, of a broken PNG
+    except (OSError, SyntaxError, Image.DecompressionBombError) as error:  # SyntaxError: Pillow's, of a broken PNG
         raise fault("is no PNG, JPEG or SVG picture") from error
 
 

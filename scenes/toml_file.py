@@ -21,6 +21,7 @@ from mitsuba_cfs.files import reason
 T = TypeVar("T", bound=BaseModel)
 Positive = Annotated[float, Field(gt=0)]
 Share = Annotated[float, Field(ge=0, le=1)]
+Key = Annotated[str, Field(max_length=200)]  # a path of keys, as "box.window.0.width"
 
 # What is wrong with a value, by pydantic's name of the fault; its `ctx` fills the braces
 WANTED = {
@@ -31,6 +32,7 @@ WANTED = {
     "too_short": "at least {min_length} entries",
     "too_long": "at most {max_length} entries",
     "string_too_short": "a text that is not empty",
+    "string_too_long": "a text of at most {max_length} characters",
     "finite_number": "a finite number",
     "literal_error": "{expected}",
 }
@@ -77,6 +79,20 @@ def validated(model: type[T], table: dict[str, Any], path: Path) -> T:
         more = f" (and {len(others)} more)" if others else ""
         field = ".".join(place) or None
         raise DataError(_message(first, model) + more, file=path, field=field) from error
+
+
+def check_kinds(model: type[BaseModel], table: Mapping[str, Any], path: Path) -> None:
+    """`DataError` for the first value of a table that is of another kind than the model's.
+
+    Keys that are missing, and values out of their range, pass: the table may be incomplete.
+    """
+    try:
+        model.model_validate(table)
+    except ValidationError as error:
+        for fault in error.errors(include_url=False):
+            if fault["type"].endswith("_type"):
+                field = ".".join(map(str, fault["loc"]))
+                raise DataError(_message(fault, model), file=path, field=field) from error
 
 
 def tables_of(annotation: object) -> Iterator[type[BaseModel]]:
@@ -211,6 +227,8 @@ def set_key(table: Any, parts: list[str], value: Any, *, made: bool) -> None:
         for one in table:
             set_key(one, parts, value, made=made)
         return
+    if not isinstance(table, dict):
+        raise DataError(f"there is no table to set {first!r} in, but {_shown(table)}")
     if not rest:
         table[first] = value
         return

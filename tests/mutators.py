@@ -204,3 +204,17 @@ def of_arrays(content: bytes, random: np.random.Generator) -> bytes:
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()
+
+
+def of_properties(content: bytes, random: np.random.Generator) -> bytes:
+    """An IFC file: a value of one of its last four properties as text, or nested very deep."""
+    lines = content.splitlines(keepends=True)
+    places = [number for number, line in enumerate(lines) if b"IFCPROPERTYSINGLEVALUE" in line]
+    number = int(random.choice(places[-4:]))
+    before, text, after = lines[number].partition(b"$,")
+    if random.random() < 0.02:
+        after = b"IFCTEXT('" + b"[" * DEEP + b"]" * DEEP + b"'),$);\n"
+    else:
+        after = of_text(after, random)
+    lines[number] = before + text + after
+    return b"".join(lines)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.conftest import REPOSITORY
+from tests.validation import mutants
 
 DOCS = REPOSITORY / "docs"
 SAID = ("- Judge:", "- Shared:", "- Cannot show:")
@@ -96,3 +97,9 @@ def test_the_glossary_counts_klems_patches_as_the_code_does():
     full, half, quarter = (basis.size for basis in (KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER))
     said = f"{full} x {full} (full), {half} (half) or {quarter} (quarter) patches"
     assert said in (DOCS / "glossary.md").read_text("utf-8")
+
+
+def test_modules_in_which_faults_are_planted_are_there():
+    for module, tests in mutants.MODULES.items():
+        assert (REPOSITORY / f"{module}.py").is_file(), module
+        assert all((REPOSITORY / "tests" / f"{one}.py").is_file() for one in tests), module

@@ -6,18 +6,24 @@ Every reader of a format that comes from others has a row.  40 mutations of each
 
 from __future__ import annotations
 
+import base64
 import json
 import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from types import SimpleNamespace
+from typing import Any, Literal, cast
 
+import ifcopenshell
 import numpy as np
+import pandas as pd
 import pytest
+import trimesh
 
 from bim.building_file import read_building_file
 from bim.fenestration import read_g_table
+from bim.ifc.control import StoredGroup, read_control, write_control
 from bim.ifc.corrections import read_corrections
 from bim.radiance.cell import read_radiance_layer
 from bim.surroundings.placement import read_horizon, read_surroundings
@@ -29,23 +35,35 @@ from mitsuba_cfs.bsdf.spectral_pane import read_glazing_layers, read_pane_file
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import CfsError
+from mitsuba_cfs.files import json_text as result_text
+from mitsuba_cfs.files import read_json
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.images.hdr import read_hdr, write_hdr
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.matrices.mtx_io import read_matrix, write_matrix
+from mitsuba_cfs.metrics.photometry import read_photometry
 from mitsuba_cfs.sky.epw import read_epw, read_wea
 from mitsuba_cfs.sky.measured import read_measured
+from scenes.app.actions import computations
+from scenes.app.project import Project
+from scenes.app.server import AppServer, variants
 from scenes.comply.uses import read_uses
-from scenes.demo import WEATHER
+from scenes.demo import OFFICE, WEATHER
 from scenes.explore.case_files import case_files, read_case
 from scenes.explore.folder import write_explorer
 from scenes.fenestration.systems import read_system
-from scenes.fenestration.thermal_file import read_angular_table
+from scenes.fenestration.thermal_file import read_angular_table, read_reflectance, read_slat_light, read_spectrum
+from scenes.fit.fit_file import read_fit
+from scenes.heat.measured_weather import read_measured as read_named_columns
 from scenes.heat.study_file import read_study as read_heat_study
 from scenes.page_options import read_page
 from scenes.photovoltaics.study_file import read_pv_study
 from scenes.result_folder import FolderMark, ResultFolder
+from scenes.room.luminaires import lamp_spectrum
 from scenes.room.operation import read_operation
+from scenes.room.schedules import ScheduleTable
+from scenes.room_views import parsed_views
+from scenes.site.reflections import read_observers
 from scenes.study.store import CaseResult, Store
 from scenes.study.study_file import read_study
 from scenes.user_errors import LONGEST, user_message
@@ -60,9 +78,13 @@ from tests.bsdf.test_radiance_cell import CELLULAR, PERIOD
 from tests.bsdf.test_shade_file import product
 from tests.conftest import REPOSITORY
 from tests.explore.synthetic import explored_run
+from tests.metrics.test_photometry import GAMMA, ies, ldt
+from tests.scenes.test_measured_weather import frame as measured_frame
+from tests.scenes.test_measured_weather import table_of as measured_table
+from tests.thermal.test_study import study_file as thermal_file
 
 QUICK, SLOW = 40, 20_000
-SILENT = ("mark", "case of a study")  # results of this program that are then computed again
+SILENT = ("mark", "case of a study", "journal")  # what is then computed again, or a line that is left out
 DEMO = WEATHER.parent
 ROOM = """void plastic white
 0 0 5 .7 .7 .7 0 0
@@ -131,6 +153,78 @@ key = "office"
 occupied = true
 words = ["office", "studio"]
 """
+INTENSITIES = 300.0 * np.cos(np.radians(GAMMA))
+WAVELENGTHS = range(380, 781, 10)
+SPECTRUM = "wavelength_nm,{}\n" + "".join(f"{nm},{nm / 1000:g}\n" for nm in WAVELENGTHS)
+SPDX = '<IESTM2714 xmlns="iestm2714" version="1.0"><SpectralDistribution>{}</SpectralDistribution></IESTM2714>'.format(
+    "".join(f'<SpectralData wavelength="{nm}">{nm / 700:.3f}</SpectralData>' for nm in WAVELENGTHS)
+)
+SLATS = {
+    "wavelength_nm": [*WAVELENGTHS],
+    "reflectance": [nm / 1000 for nm in WAVELENGTHS],
+    "shares": np.full((1, 145, 145), 0.5).tolist(),
+}
+OBSERVERS = "name,x,y,z,sight_azimuth_deg,sight_altitude_deg\nroad,12,-30,1.2,270,0\npath,0,-20,1.7,,\n"
+VIEWS = "rvu -vta -vp 2 3 1.2 -vd 0 1 0 -vu 0 0 1 -vh 180 -vv 180\nrvu -vtv -vp 1 1 1.2 -vd 0 1 0 -vh 60 -vv 40\n"
+TREES = """[[tree]]
+at = [10.0, 5.0]
+height = 8.0
+crown_radius = 3.0
+crown_base = 2.0
+transmittance = "deciduous"
+[[tree]]
+object = "crown 1"
+transmittance = [0.5, 0.5, 0.4, 0.3, 0.1, 0.1, 0.1, 0.1, 0.2, 0.3, 0.5, 0.5]
+"""
+CLOCK = "hour,people\n" + "".join(f"{hour},{hour / 24:.2f}\n" for hour in range(24))
+PARAMETER = """study = "study.toml"
+measured = "measured.csv"
+begin = 2017-05-02T00:00:00
+average_h = 1.0
+[[measurement]]
+column = "air"
+quantity = "air temperature"
+[[parameter]]
+key = "air.infiltration_ach"
+mean = 0.5
+deviation = 0.2
+low = 0.02
+[[parameter]]
+keys = ["gains.persons"]
+factor = true
+deviation = 0.2
+"""
+PROJECT = """title = "A"
+quick = true
+operation = "operation.toml"
+[[room]]
+name = "office"
+building = "inputs/office.ifc"
+spaces = ["A"]
+[[system]]
+name = "blind"
+bsdf = "inputs/blind.xml"
+[[climate]]
+name = "w"
+weather = "inputs/w.epw"
+[options]
+seed = 3
+"""
+COMPARED = "space,system,sda300_50,operative_max_c,error\nOffice,blind,40.5,28.1,\nOffice,glass,60.0,31.0,\n"
+JOURNAL = """{"command": ["cfs", "run", "inputs/office.ifc", "--out", "results/report-blind"], "kind": "run", \
+"title": "blind", "started": 1.0, "seconds": 3.0, "state": "done", "code": 0}
+"""
+WANTED = {
+    "title": "B",
+    "spaces": ["A"],
+    "furniture": True,
+    "systems": [{"name": "glass", "see_through": ["specular"], "u_value": 1.1, "g_value": 0.5}],
+    "quick": False,
+    "loads": {"heating_c": 20.0, "cooling_c": 26.0, "equipment_w_m2": 5.0},
+    "uses": {"0": "office"},
+}
+MESHES: dict[str, dict[str, Any]] = {"gltf": {}, "ply": {"encoding": "ascii"}, "stl_ascii": {}}
+ACTIONS = {"report": True, "standards": ["en17037"], "language": "en", "compare": True}
 
 
 def klems(file: Path) -> None:
@@ -221,6 +315,119 @@ def copied(source: Path) -> Callable[[Path], object]:
 
 def text(content: str) -> Callable[[Path], object]:
     return lambda file: file.write_text(content)
+
+
+def finite(read: Callable[[Path], Any]) -> Callable[[Path], Any]:
+    """A reader whose numbers are finite: NaN and infinity of a file never leave it."""
+
+    def reads(file: Path) -> Any:
+        result = read(file)
+        for numbers in result if isinstance(result, tuple) else (result,):
+            assert np.isfinite(numbers).all()
+        return result
+
+    return reads
+
+
+def lamp(file: Path) -> tuple[np.ndarray | float, ...]:
+    one = read_photometry(file)
+    return one.gamma_deg, one.c_deg, one.candela, one.watts, one.lumens
+
+
+def slats(file: Path) -> tuple[np.ndarray, ...]:
+    light = read_slat_light(file)
+    return light.reflectance, light.shares
+
+
+def observers(file: Path) -> tuple[np.ndarray, ...]:
+    return tuple(part for one in read_observers(file) for part in (one.point, one.sight) if part is not None)
+
+
+def schedule(file: Path) -> np.ndarray:
+    table = ScheduleTable(csv=file, column="people")
+    return table.hourly(cast(Any, SimpleNamespace(times=range(24))), ())
+
+
+def fitted(file: Path) -> None:
+    thermal_file(file.parent, "[gains]\npersons = 2\n[air]\ninfiltration_ach = 0.5\n")
+    (file.parent / "fit.toml").write_text(PARAMETER)
+    hours = pd.date_range("2017-05-01", periods=60, freq="h", inclusive="right").strftime("%Y-%m-%dT%H:%M")
+    rows = [f"{hour},{20 + number / 24:.3f}\n" for number, hour in enumerate(hours)]
+    (file.parent / "measured.csv").write_text("time,air\n" + "".join(rows))
+
+
+def planted(file: Path) -> tuple[np.ndarray, ...]:
+    fit = read_fit(file)
+    assert not np.isinf(fit.readings.to_numpy()).any()
+    return fit.mean, fit.deviation
+
+
+def measured_weather(file: Path) -> None:
+    measured_frame(60).to_csv(file, index=False)
+
+
+def named_columns(file: Path) -> tuple[np.ndarray, ...]:
+    weather = read_named_columns(file, measured_table())
+    return weather.direct_normal, weather.diffuse_horizontal, weather.dry_bulb_c
+
+
+def folder_of_project(file: Path) -> Path:
+    return file.parents[2] if file.name == "results.csv" else file.parent
+
+
+def project(file: Path) -> None:
+    """A project of the app: its study, journal and comparison, and the one under test among them."""
+    one = Project(folder_of_project(file))
+    (one.folder / "study.toml").write_text(PROJECT)
+    (one.folder / "operation.toml").write_text("[loads]\nheating_c = 20.0\n[gains]\npersons = 1\n")
+    (one.folder / "commands.jsonl").write_text(JOURNAL)
+    results = one.folder / "results" / "comparison"
+    results.mkdir(exist_ok=True)
+    (results / "results.csv").write_text(COMPARED)
+    (results / "study.json").write_text('{"quick": true}')
+    (one.folder / "request.json").write_text(json.dumps(WANTED))
+    (one.folder / "action.json").write_text(json.dumps(ACTIONS))
+
+
+def shown(file: Path) -> None:
+    """What the page of the app shows of a project."""
+    one = Project(folder_of_project(file))
+    result_text(AppServer(one, cast(Any, SimpleNamespace()))._facts())
+    result_text(variants(one))
+
+
+def changed(file: Path) -> None:
+    """A request of the page; the project can then be shown."""
+    one = Project(file.parent)
+    (one.folder / "study.toml").write_text(PROJECT)
+    one.change(read_json(file))
+    shown(file)
+
+
+def wanted_actions(file: Path) -> None:
+    for action in computations(Project(file.parent), read_json(file)):
+        assert action.text
+
+
+def mesh_of(kind: str) -> Callable[[Path], object]:
+    def write(file: Path) -> None:
+        content = trimesh.creation.box((1.0, 2.0, 3.0)).export(file_type=kind, **MESHES[kind])
+        if isinstance(content, dict):  # glTF, whose buffers are beside it
+            document = json.loads(content["model.gltf"])
+            for buffer in document["buffers"]:
+                data = base64.b64encode(content[buffer["uri"]]).decode()
+                buffer["uri"] = f"data:application/octet-stream;base64,{data}"
+            content = json.dumps(document)
+        file.write_bytes(content if isinstance(content, bytes) else content.encode())
+
+    return write
+
+
+def stored_rules(file: Path) -> None:
+    """Rules of a shading group in an IFC file."""
+    windows = [one.GlobalId for one in ifcopenshell.open(OFFICE).by_type("IfcWindow")[:1]]
+    rule = {"rule": "any", "hold_h": 2, "parts": [{"rule": "irradiance", "close_above": 180.0, "open_below": 90.0}]}
+    write_control(OFFICE, file, [StoredGroup("group", tuple(windows), rule)])
 
 
 def read_searched(file: Path) -> None:
@@ -338,13 +545,53 @@ ROWS = {
     "page": Row("page.toml", text(PAGE), mutators.of_toml, lambda file: read_page(file, Literal["model", "rooms"])),
     "room uses": Row("uses.toml", text(USES), mutators.of_toml, read_uses),
     "corrections": Row("c.toml", text(CORRECTIONS), mutators.of_toml, read_corrections),
+    "luminaire": Row("l.ies", text(ies([0.0, 45.0, 90.0], GAMMA, [INTENSITIES] * 3)), mutators.of_text, finite(lamp)),
+    "luminaire of Europe": Row("l.ldt", text(ldt(0, 4, GAMMA, [INTENSITIES] * 4)), mutators.of_text, finite(lamp)),
+    "spectrum of a lamp": Row(
+        "l.csv", text(SPECTRUM.format("power")), mutators.of_text, finite(lambda file: lamp_spectrum(str(file)))
+    ),
+    "lamp of TM-27": Row("l.spdx", text(SPDX), mutators.of_xml, finite(lambda file: lamp_spectrum(str(file)))),
+    "spectrum of a system": Row(
+        "s.csv", text(SPECTRUM.format("transmittance")), mutators.of_text, finite(read_spectrum)
+    ),
+    "spectrum of slats": Row("s.csv", text(SPECTRUM.format("reflectance")), mutators.of_text, finite(read_reflectance)),
+    "light of slats": Row("s.json", json_text(SLATS), mutators.of_json, finite(slats)),
+    "observers": Row("o.csv", text(OBSERVERS), mutators.of_text, finite(observers)),
+    "views": Row("v.vf", text(VIEWS), mutators.of_text, lambda file: parsed_views(str(file))),
+    "schedule": Row("s.csv", text(CLOCK), mutators.of_text, finite(schedule)),
+    "trees": Row("t.toml", text(TREES), mutators.of_toml, read_surroundings),
+    "mesh of glTF": Row("m.gltf", mesh_of("gltf"), mutators.of_json, read_surroundings),
+    "mesh of PLY": Row("m.ply", mesh_of("ply"), mutators.of_text, read_surroundings),
+    "mesh of STL": Row("m.stl", mesh_of("stl_ascii"), mutators.of_text, read_surroundings),
+    "fit": Row("fit.toml", fitted, mutators.of_toml, finite(planted)),
+    "measurements of a fit": Row(
+        "measured.csv", fitted, mutators.of_text, lambda file: finite(planted)(file.with_name("fit.toml"))
+    ),
+    "measured weather": Row("site.csv", measured_weather, mutators.of_text, finite(named_columns)),
+    "project": Row("study.toml", project, mutators.of_toml, shown),
+    "journal": Row("commands.jsonl", project, mutators.of_text, shown),
+    "request": Row("request.json", project, mutators.of_json, changed),
+    "commands asked for": Row("action.json", project, mutators.of_json, wanted_actions),
+    "comparison": Row("results/comparison/results.csv", project, mutators.of_text, shown),
+    "control in IFC": Row("c.ifc", stored_rules, mutators.of_properties, read_control),
     "explorer": Row("case.js", explorer, mutators.of_script, explored),
     "mark": Row("cfs-results.json", mark, mutators.of_json, results_again),
     "case of a study": Row("case.npz", case_result, mutators.of_arrays, stored),
 }
 
 # Mutations that were no line once: row, number
-REGRESSIONS: list[tuple[str, int]] = [("pv study", 82)]
+REGRESSIONS: list[tuple[str, int]] = [
+    ("pv study", 82),
+    ("luminaire", 67),
+    ("luminaire of Europe", 153),
+    ("lamp of TM-27", 271),
+    ("light of slats", 58),
+    ("observers", 51),
+    ("mesh of glTF", 294),
+    ("mesh of PLY", 77),
+    ("project", 48),
+    ("request", 633),
+]
 
 
 @dataclass

@@ -123,10 +123,12 @@ def _value(one: Entity, path: str | PathLike[str], group: Entity) -> Any:
     nominal = getattr(one, "NominalValue", None)
     if nominal is None:
         raise DataError("has no value", **where)
-    value = nominal.wrappedValue
+    value = getattr(nominal, "wrappedValue", nominal)
+    if not isinstance(value, str | bool | int | float):
+        raise DataError("expected a single value", **where)
     if not isinstance(value, str) or not value.startswith(AS_JSON):
         return value
     try:
         return json.loads(value)
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise DataError(f"is no list or table: {error}", **where) from None

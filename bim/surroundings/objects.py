@@ -26,6 +26,7 @@ SUFFIXES = (".obj", ".stl", ".ply", ".glb", ".gltf")
 FAULTS = (
     ValueError,
     LookupError,
+    NameError,
     TypeError,
     AttributeError,
     ArithmeticError,

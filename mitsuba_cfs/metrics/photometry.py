@@ -16,6 +16,7 @@ TYPE_C = 1  # of LM-63: vertical angle from nadir, horizontal angle around the v
 # EULUMDAT's Isym: planes that the file holds, of M in all, and how the others follow
 SYMMETRIES = {0: "none", 1: "axis", 2: "C0-C180", 3: "C90-C270", 4: "both"}
 HEAD_LINES = 26  # of EULUMDAT before its sets of lamps
+BRIGHTEST = 1e9  # of an intensity [cd] and a power [W]: a lighthouse has 1e6 to 1e7 cd
 AFTER_LAMPS = 10  # ratios of direct light by room index
 
 
@@ -140,8 +141,10 @@ def _around(name: str, gamma: FloatArray, c: FloatArray, candela: FloatArray, wa
             c = np.concatenate([c, 2 * c[-1] - c[::-1][1:]])
             candela = np.concatenate([candela, candela[::-1][1:]])
     rising = np.all(np.diff(gamma) > 0) and np.all(np.diff(c) > 0)
-    if not rising or candela.min() < 0:
+    if not rising or not (candela >= 0).all():
         raise DataError("angles do not rise, or an intensity is negative", file=path)
+    if candela.max() > BRIGHTEST or not 0 <= watts <= BRIGHTEST:
+        raise DataError(f"expected an intensity and a power from 0 to {BRIGHTEST:g} cd and W", file=path)
     return Photometry(name, gamma, c, candela, watts)
 
 

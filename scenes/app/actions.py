@@ -87,14 +87,14 @@ def computations(project: Project, wanted: Mapping[str, Any]) -> list[Action]:
             command += ["--annual-glare"] if wanted.get("annual_glare") else []
             command += ["--explore"] if wanted.get("explore") else []
             out = f"{RESULTS}/report-{name}"
-            actions.append(Action("run", system["name"], (*command, *pages, "--out", out), out))
+            actions.append(Action("run", _name(system), (*command, *pages, "--out", out), out))
         if standards:
             command = ["comply", *shared, *_states(project, system), *_options(study)]
             command += [part for one in standards for part in ("--standard", one)]
             command += ["--annual-glare"] if wanted.get("annual_glare") else []
             command += ["--uses", USES] if (project.folder / USES).is_file() else []
             out = f"{RESULTS}/rules-{name}"
-            actions.append(Action("comply", system["name"], (*command, *pages, "--out", out), out))
+            actions.append(Action("comply", _name(system), (*command, *pages, "--out", out), out))
     if wanted.get("compare"):
         _weather(study)
         _files(project)
@@ -107,7 +107,7 @@ def _folders(systems: Sequence[Mapping[str, Any]]) -> list[str]:
     """Names of the systems as those of folders, with a number where one is taken."""
     folders: list[str] = []
     for system in systems:
-        name = first = slug(system["name"])
+        name = first = slug(_name(system))
         number = 2
         while name in folders:
             name, number = f"{first}-{number}", number + 1
@@ -115,11 +115,16 @@ def _folders(systems: Sequence[Mapping[str, Any]]) -> list[str]:
     return folders
 
 
+def _name(system: Mapping[str, Any]) -> str:
+    """A system's name, else that of its file."""
+    return str(system.get("name") or Path(system.get("bsdf") or system.get("operation") or "").stem)
+
+
 def result_titles(study: Mapping[str, Any]) -> dict[str, str]:
     """The systems of folders of results by the folders' names, as `computations` calls them."""
     systems = study.get("system", [])
     named = list(zip(systems, _folders(systems), strict=True))
-    return {f"{kind}-{name}": one["name"] for kind in ("report", "rules") for one, name in named}
+    return {f"{kind}-{name}": _name(one) for kind in ("report", "rules") for one, name in named}
 
 
 def _made_by(name: str, journal: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
@@ -186,16 +191,16 @@ def export(project: Project, form: str) -> Action:
     out = f"{RESULTS}/export/{EXPORTS[form]}"
     building = _files(project)
     command = ["export", *building, *_rooms(study), f"--{form}", out]
-    climate = study.get("climate", [])
-    command += ["--weather", climate[0]["weather"]] if form == "epjson" and climate else []
+    weather = [one["weather"] for one in study.get("climate", []) if one.get("weather")]
+    command += ["--weather", weather[0]] if form == "epjson" and weather else []
     return Action("export", form, tuple(command), out)
 
 
 def _weather(study: Mapping[str, Any]) -> str:
-    climate = study.get("climate", [])
-    if not climate:
+    weather = [one["weather"] for one in study.get("climate", []) if one.get("weather")]
+    if not weather:
         raise DataError("drop a weather file (EPW) first", field="weather")
-    return str(climate[0]["weather"])
+    return str(weather[0])
 
 
 def _entry(study: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -25,15 +25,19 @@ from typing import Any
 from xml.etree import ElementTree
 
 import tomlkit
+from pydantic import BaseModel
 from tomlkit.items import AoT, Table
 
 from bim.building_file import check_building_file
 from bim.ifc.corrections import corrections_file, read_corrections
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import json_text, reason, write_text
+from scenes.comply.uses import UsesFile
 from scenes.input_files import read_weather
 from scenes.result_folder import remove_results
-from scenes.toml_file import read_table
+from scenes.room.operation_tables import OperationTables
+from scenes.study.study_file import Study
+from scenes.toml_file import check_kinds, read_table
 
 INPUTS, RESULTS, LOGS = "inputs", "results", "log"
 STUDY, OPERATION, USES, JOURNAL = "study.toml", "operation.toml", "uses.toml", "commands.jsonl"
@@ -267,13 +271,21 @@ class Project:
     # ---- the study
 
     def study(self) -> dict[str, Any]:
-        """The tables of the study file; empty where there is none."""
-        path = self.folder / STUDY
-        return read_table(path) if path.is_file() else {}
+        """The tables of the study file; empty where there is none.
+
+        Raises: `DataError` for a file that is no study of the page: a value of another kind, a building's
+            file that would be an option of a command.
+        """
+        study = self._table(STUDY, Study)
+        for one in self._building(study):
+            if one.startswith("-"):
+                raise DataError("expected a file of a building", file=self.folder / STUDY, field="room.building")
+        return study
 
     def write_study(self, study: Mapping[str, Any]) -> None:
         """Write the study file, empty lists left out."""
         kept = {key: value for key, value in study.items() if value not in ([], {}, None, "")}
+        check_kinds(Study, kept, self.folder / STUDY)
         write_table(self.folder / STUDY, kept)
 
     @staticmethod
@@ -423,8 +435,14 @@ class Project:
 
     def operation(self) -> dict[str, Any]:
         """Gains and set points of all rooms."""
-        path = self.folder / OPERATION
-        return read_table(path) if path.is_file() else {}
+        return self._table(OPERATION, OperationTables)
+
+    def _table(self, name: str, model: type[BaseModel]) -> dict[str, Any]:
+        """A TOML file of the project, whose values are of the model's kinds; empty where there is none."""
+        path = self.folder / name
+        table = read_table(path) if path.is_file() else {}
+        check_kinds(model, table, path)
+        return table
 
     def corrections(self) -> dict[str, Any]:
         """The corrections beside the building's first file."""
@@ -434,8 +452,7 @@ class Project:
 
     def uses(self) -> dict[str, str]:
         """Uses of rooms that the page states, by GUID."""
-        path = self.folder / USES
-        return dict(read_table(path).get("rooms", {})) if path.is_file() else {}
+        return dict(self._table(USES, UsesFile).get("rooms", {}))
 
     @_alone
     def use_made(self, made: MadeSystem) -> None:
@@ -456,9 +473,7 @@ class Project:
 
     def states(self, operation: str) -> list[str]:
         """The BSDF files of a moving system, the open one first, relative to the project."""
-        path = self.folder / operation
-        tables = read_table(path).get("system", []) if path.is_file() else []
-        folder = Path(operation).parent
+        tables, folder = self._table(operation, OperationTables).get("system", []), Path(operation).parent
         return [(folder / one["bsdf"]).as_posix() for one in tables if "bsdf" in one]
 
     # ---- results
@@ -496,8 +511,8 @@ class Project:
         """The commands that were run, the latest last; lines that are none are left out."""
         path = self.folder / JOURNAL
         lines = []
-        for text in path.read_text("utf-8").splitlines() if path.is_file() else ():
-            with suppress(ValueError):
+        for text in path.read_text("utf-8", errors="replace").splitlines() if path.is_file() else ():
+            with suppress(ValueError, RecursionError):
                 line = json.loads(text)
                 if isinstance(line, dict) and isinstance(line.get("command"), list):
                     lines.append(line)

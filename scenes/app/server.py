@@ -12,6 +12,7 @@ import asyncio
 import csv
 import hmac
 import json
+import math
 import mimetypes
 import os
 import secrets
@@ -30,8 +31,8 @@ from starlette.responses import FileResponse, HTMLResponse, RedirectResponse, Re
 from starlette.routing import Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from mitsuba_cfs.errors import CfsError
-from mitsuba_cfs.files import json_text, read_json
+from mitsuba_cfs.errors import CfsError, DataError
+from mitsuba_cfs.files import json_text, read_json, reason
 from scenes.app import actions
 from scenes.app.jobs import Jobs
 from scenes.app.project import GAINS, INPUTS, LOADS, RESULTS, MadeSystem, Project, plain_name
@@ -66,8 +67,13 @@ def variants(project: Project, language: str = "en") -> dict[str, Any] | None:
     table = folder / "results.csv"
     if not table.is_file():
         return None
-    with table.open(encoding="utf-8", newline="") as file:
-        cases = list(csv.DictReader(file))
+    try:
+        with table.open(encoding="utf-8", newline="") as file:
+            cases = list(csv.DictReader(file))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise DataError(f"cannot be read: {reason(error)}", file=table) from None
+    if not all(case.get("space") and case.get("system") for case in cases):
+        raise DataError("expected the columns space and system", file=table)
     shown = [key for key in FIGURES if any(case.get(key) for case in cases)]
     with in_language(language):
         named = [quantity(key) for key in shown]
@@ -99,9 +105,10 @@ def variants(project: Project, language: str = "en") -> dict[str, Any] | None:
 
 def _number(text: str) -> float | None:
     try:
-        return float(text)
+        value = float(text or "")
     except ValueError:
         return None
+    return value if math.isfinite(value) else None
 
 
 class _Answers(HTMLParser):

@@ -13,7 +13,7 @@ from scenes import plausible
 from scenes.design.measures import GOALS, MEASURES, Limit, Measure, column_measure, need_limit, rule_level
 from scenes.fenestration.thermal_file import GlazingLayerTable
 from scenes.study.study_file import Name, Study, SystemTable, name_entries, unique, with_places
-from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
+from scenes.toml_file import Key, Positive, Share, TomlTable, read_table, validated
 
 Slat = Annotated[Positive, plausible.SLAT]
 Tilt = Annotated[float, Field(ge=-90, le=90)]
@@ -82,7 +82,7 @@ class VariableTable(TomlTable):
     """What may vary: a key with a range, with steps or values; or choices that set several keys."""
 
     name: str = ""
-    key: str = ""
+    key: Key = ""
     low: float | None = None
     high: float | None = None
     step: Positive | None = None  # none: any number between

@@ -518,8 +518,9 @@ def read_slat_light(path: Path) -> SlatLight:
         raise DataError(f"expected {size} x {size} patches for each number of reflections", file=path, field="shares")
     if nm.shape != rho.shape or not np.array_equal(nm, NANOMETRES[::SLAT_STEP]):
         raise DataError(f"expected a reflectance every {SLAT_STEP} nm from 380 to 780", file=path, field="reflectance")
-    if rho.min() < 0 or rho.max() > 1:
-        raise DataError("expected reflectances from 0 to 1", file=path, field="reflectance")
+    for name, values in (("reflectance", rho), ("shares", shares)):
+        if not ((values >= 0) & (values <= 1)).all():
+            raise DataError("expected numbers from 0 to 1", file=path, field=name)
     return SlatLight(np.interp(NANOMETRES, nm, rho), shares)
 
 

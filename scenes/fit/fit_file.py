@@ -19,7 +19,7 @@ from mitsuba_cfs.files import reason
 from mitsuba_cfs.sky.weather import Weather
 from scenes.heat.measured_weather import interval_ends, no_column
 from scenes.heat.study_file import StudyFile, study_of
-from scenes.toml_file import Positive, TomlTable, read_table, set_key, validated, with_absolute_files
+from scenes.toml_file import Key, Positive, TomlTable, read_table, set_key, validated, with_absolute_files
 from scenes.uncertain_inputs import INPUTS
 
 Array = NDArray[np.float64]
@@ -43,8 +43,8 @@ class ParameterTable(TomlTable):
     """An input that is fitted: a number of the study, or a factor of several."""
 
     name: str = ""
-    key: str = ""
-    keys: tuple[str, ...] = ()
+    key: Key = ""
+    keys: tuple[Key, ...] = ()
     factor: bool = False  # the numbers at the keys are multiplied by it
     mean: float | None = None  # of the prior; None: the study's own number, 1 of a factor
     deviation: Positive | None = None  # of the prior; None: the usual one of docs/sensitivities.md
@@ -157,7 +157,10 @@ class Fit:
                     number = float(value)
                     if parameter.factor:
                         number *= _number_at(self.study, path, parameter.label, self.file)
-                    set_key(table, path, round(number, 9), made=True)
+                    try:
+                        set_key(table, path, round(number, 9), made=True)
+                    except DataError as error:
+                        raise DataError(error.message, file=self.file, field=f"parameter {parameter.label}") from None
         return table
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 from bim.electric_light import Luminaire, lamp_light
 from bim.model import Building, Space
 from bim.sensors import in_room, sensor_grid
+from bim.xml_elements import xml_elements
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.metrics.photometry import read_photometry
 from mitsuba_cfs.spectra.detectors import NANOMETRES, detected, illuminant, is_illuminant
@@ -19,6 +19,8 @@ from scenes.room.operation_tables import GainsTable, LuminaireTable, OperationTa
 from scenes.room.options import SensorGrid
 
 FloatArray = NDArray[np.float64]
+SPDX_BYTES = 16 << 20
+MOST_POWER = 1e12  # of a spectrum in any unit
 LAMP_COLUMNS = ("wavelength_nm", "power")
 
 
@@ -162,10 +164,10 @@ def lamp_spectrum(source: str) -> FloatArray:
             nm, values = (csv_columns(path, LAMP_COLUMNS)[name] for name in LAMP_COLUMNS)
         else:
             nm, values = _spdx(path)
-        if len(nm) < 2 or np.any(np.diff(nm) <= 0) or nm[0] > 400 or nm[-1] < 700:
+        if len(nm) < 2 or not (np.diff(nm) > 0).all() or not (nm[0] <= 400 and nm[-1] >= 700):
             raise DataError("expected rising wavelengths from 400 to 700 nm at least", file=path)
-        if values.min() < 0 or not np.isfinite(values).all():
-            raise DataError("expected powers that are not negative", file=path)
+        if not ((values >= 0) & (values <= MOST_POWER)).all():
+            raise DataError(f"expected powers from 0 to {MOST_POWER:g}", file=path)
         power = np.interp(NANOMETRES, nm, values, left=0.0, right=0.0)
     lumens = float(detected(power)[0])
     if lumens <= 0:
@@ -175,14 +177,11 @@ def lamp_spectrum(source: str) -> FloatArray:
 
 def _spdx(path: Path) -> tuple[FloatArray, FloatArray]:
     """Wavelengths [nm] and powers of a file of IES TM-27."""
+    ((root, _),) = xml_elements(path, None, depth=1, most_bytes=SPDX_BYTES)
+    words = [(item.get("wavelength", ""), item.text or "") for item in root.iter("SpectralData")]
     try:
-        root = ElementTree.fromstring(path.read_bytes())
-        rows = [
-            (float(item.attrib["wavelength"]), float(item.text or ""))
-            for item in root.iter()
-            if item.tag.rpartition("}")[2] == "SpectralData"
-        ]
-    except (ElementTree.ParseError, KeyError, ValueError) as error:
+        rows = [(float(wavelength), float(power)) for wavelength, power in words]
+    except ValueError as error:
         raise DataError(f"is no spectrum of IES TM-27 (SPDX): {error}", file=path) from None
     if not rows:
         raise DataError("is no spectrum of IES TM-27 (SPDX): no SpectralData", file=path)

@@ -29,6 +29,7 @@ COLUMNS, SIGHT = ("name", "x", "y", "z"), ("sight_azimuth_deg", "sight_altitude_
 SAME_PLANE = 3  # digits of a normal by which panes are one mirror
 APART_DEG = 10.0  # between sun and reflection, below which the sun itself dazzles from there
 BESIDE_DEG = 30.0  # of the line of sight
+FARTHEST = 1e9  # of a coordinate [m]
 NEAR = 0.02  # of a pane, which its element may cover [m]
 SUN_SR = 6.79e-5  # solid angle of the sun's disc
 TRANSMITTANCE = 0.8  # of a clear double glazing, whose reflectance then follows from the angle
@@ -69,7 +70,7 @@ def read_observers(file: str | PathLike[str]) -> list[Observer]:
     numbers = [*COLUMNS[1:], *(name for name in SIGHT if name in table.columns)]
     for name in numbers:
         values = pd.to_numeric(table[name], errors="coerce")
-        wrong = values.isna() & (table[name].notna() if name in SIGHT else True)
+        wrong = ~(values.abs() <= FARTHEST) & (table[name].notna() if name in SIGHT else True)
         if wrong.any():
             row = int(np.flatnonzero(wrong)[0])
             raise DataError(f"expected a number, got {table[name].iloc[row]!r} in row {row + 2}", file=file, field=name)

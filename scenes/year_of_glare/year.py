@@ -205,7 +205,7 @@ def _stored_effects(file: Path) -> dict[str, float] | None:
     try:
         stored = json.loads(file.read_text("utf-8"))
         return {str(name): float(value) for name, value in stored.items()}
-    except (OSError, ValueError, AttributeError, TypeError):
+    except (OSError, ValueError, AttributeError, TypeError, RecursionError):
         return None
 
 

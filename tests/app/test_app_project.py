@@ -366,3 +366,27 @@ def test_a_comparison_and_a_moving_system_know_their_files(project) -> None:
     project.change({"corrections": {"north": 10}})
     os.utime(corrections, (at + 5, at + 5))
     assert "office.corrections.toml" in actions.outdated(project, "report-glazing", project.journal())
+
+
+def test_a_building_is_no_option_of_a_command(project) -> None:
+    """A stranger's study file names `--html=FILE` as its building, which `cfs check` would write."""
+    study = project.folder / "study.toml"
+    study.write_text('[[room]]\nname = "a"\nbuilding = "--html=../../page.html"\n')
+    with pytest.raises(DataError, match=r"room\.building: expected a file of a building"):
+        actions.check(project)
+
+
+@pytest.mark.parametrize(
+    ("file", "text"),
+    [
+        ("study.toml", "room = 3\n"),
+        ("study.toml", '[[system]]\nname = ["a"]\n'),
+        ("study.toml", 'climate = ["w.epw"]\n'),
+        ("operation.toml", "loads = [20, 26]\n"),
+        ("uses.toml", 'rooms = ["office"]\n'),
+    ],
+)
+def test_a_value_of_another_kind_is_one_line(project, file, text) -> None:
+    (project.folder / file).write_text(text)
+    with pytest.raises(DataError, match=f"{file}: .*: expected "):
+        project.study(), project.operation(), project.uses()

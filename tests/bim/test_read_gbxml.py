@@ -10,7 +10,7 @@ import pytest
 
 from bim.building_file import read_building_file
 from bim.gbxml import document
-from bim.gbxml.building import Constructions, read_gbxml
+from bim.gbxml.building import Constructions, _is_slab, read_gbxml
 from bim.gbxml.document import read_document
 from bim.shell import open_edges
 from mitsuba_cfs.errors import DataError
@@ -475,3 +475,20 @@ def test_a_door_whose_construction_transmits_light_is_glass(tmp_path):
     (pane,) = found.windows
     assert (pane.u_value, pane.visible_transmittance) == (1.4, 0.6)
     assert not changed(tmp_path, (window, door.format("wall"))).windows
+
+
+def test_a_level_polygon_is_a_slab_wherever_it_lies():
+    """A floor of 4 x 5 m, a strip of 5 x 0.05 m and a wall, near the origin and 100 km off."""
+    floor = np.array([[0.0, 0, 0], [4, 0, 0], [4, 5, 0], [0, 5, 0]])
+    strip, wall = floor * [0.0125, 1, 1], floor[:, [0, 2, 1]]
+    for place in ([0.0, 0, 0], [1e5, -1e5, 300]):
+        assert [_is_slab(ring + place) for ring in (floor, strip, wall)] == [True, False, False]
+
+
+def test_a_material_of_a_resistance_and_a_thickness_has_both(tmp_path):
+    """Without a conductivity it is the thickness by the resistance."""
+    old = '<Conductivity unit="WPerMeterK">0.9</Conductivity>'
+    path = written(tmp_path, two_rooms().replace(old, '<R-value unit="SquareMeterKPerW">2.5</R-value>'))
+    south = next(f for f in read_gbxml(path).spaces[0].faces if f.name == "Office-south")
+    brick, wool = south.construction.layers
+    assert (brick.thickness, brick.resistance, wool.resistance) == pytest.approx((0.2, 2.5, 3.0))

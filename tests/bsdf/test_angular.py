@@ -10,7 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.angular import AngularTable, check_specular, glass_table, roos_table, stack_table
+from mitsuba_cfs.bsdf.angular import (
+    AngularTable,
+    check_specular,
+    glass_table,
+    roos_table,
+    specular_matrices,
+    stack_table,
+)
 from mitsuba_cfs.bsdf.glazing import Glazing, Pane, glazing_values, pane_values, specular_klems
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from mitsuba_cfs.errors import DataError
@@ -250,3 +257,26 @@ def test_a_table_passes_no_more_than_it_gets():
     for wrong in ([1.01, 0.0], [-0.01, 0.0]):
         with pytest.raises(ValueError, match="transmittance: expected a share of 1"):
             AngularTable(theta, np.array(wrong))
+
+
+def test_a_table_that_ends_early_goes_on_to_nothing_passed_and_all_reflected():
+    """From 80 to 90 degrees the reflectance rises to 1 there and is not 1 before; means follow it."""
+    theta = np.radians([0.0, 60.0, 80.0])
+    table = AngularTable(theta, np.array([0.8, 0.7, 0.3]), *[np.array([0.1, 0.15, 0.4])] * 2)
+    angles = np.radians(np.linspace(80.0, 90.0, 401))
+    for side in ("front", "back"):
+        reflected = table.reflected(side, angles)
+        assert reflected[-1] == pytest.approx(1.0) and (np.diff(reflected) > 0).all() and reflected[-2] < 1
+    assert table.transmitted(np.pi / 2) == pytest.approx(0.0, abs=1e-12)
+    filled = specular_matrices(table)
+    fine = np.arcsin(np.sqrt(np.linspace(np.sin(np.radians(75)) ** 2, 1.0, 20_001)))
+    last = KLEMS_FULL.size - 1
+    omega = KLEMS_FULL.projected_solid_angles()[last]
+    assert filled.reflection_front[last, last] * omega == pytest.approx(table.reflected("front", fine).mean(), abs=2e-3)
+    assert filled.transmission_front[last, last] * omega == pytest.approx(table.transmitted(fine).mean(), abs=2e-3)
+
+
+def test_an_angle_beyond_the_plane_of_the_glass_is_refused():
+    AngularTable(np.radians([0.0, 90.0]), np.array([0.8, 0.0]))
+    with pytest.raises(ValueError, match="at most 90 degrees"):
+        AngularTable(np.radians([0.0, 90.3]), np.array([0.8, 0.0]))

@@ -130,6 +130,8 @@ def test_data_that_do_not_reach_are_refused():
     assert ultraviolet_value(WHOLE[4:], np.ones(len(WHOLE) - 4)) == pytest.approx(1)
     with pytest.raises(ValueError, match="rising"):
         visible_value(WHOLE[::-1], np.ones(len(WHOLE)))
+    fine = np.arange(300.0, 2500.25, 0.5)
+    assert solar_value(fine, np.full(len(fine), 0.7)) == pytest.approx(0.7)
 
 
 def test_colour_rendering_is_that_of_colour_science():

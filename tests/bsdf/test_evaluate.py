@@ -5,7 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mitsuba_cfs.bsdf.evaluate import BLOCKS, _block, bsdf_values, direct_hemispherical, klems_of, tree_position
+from mitsuba_cfs.bsdf.evaluate import (
+    BLOCKS,
+    ThroughPeak,
+    _block,
+    _peak,
+    bsdf_values,
+    direct_hemispherical,
+    held_beams,
+    klems_of,
+    neighbours,
+    ring_falls,
+    specular_exponent,
+    tree_position,
+)
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_HALF, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_merge import merged_tree
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf, morton
@@ -114,3 +127,54 @@ def test_an_isotropic_tree_goes_by_the_sine_of_incidence_in_its_first_half():
     assert at[0, 0] < 0.5
     flat = np.stack([np.sin(theta), np.zeros(3), np.cos(theta)], axis=1)
     np.testing.assert_allclose(at[1:], tree_position(tree, flat, -flat)[1:], atol=1e-9)
+
+
+@pytest.mark.parametrize("exponent", [2.0, 5.0])
+def test_a_fall_towards_grazing_comes_back_from_the_rings(exponent) -> None:
+    """Clear glass lies between; a diffuse part, or a ring that is not even, is no specular system."""
+    falls = 0.8 * ring_falls(KLEMS_FULL, exponent)[KLEMS_FULL.rings]
+    none = np.zeros((KLEMS_FULL.size, KLEMS_FULL.size))
+    assert specular_exponent(ThroughPeak(falls, none), KLEMS_FULL) == pytest.approx(exponent, abs=1e-4)
+    assert specular_exponent(ThroughPeak(0.1 * falls, none + 0.1), KLEMS_FULL) is None
+    uneven = falls * np.where(np.arange(KLEMS_FULL.size) % 2, 1.1, 0.9)
+    assert specular_exponent(ThroughPeak(uneven, none), KLEMS_FULL) is None
+
+
+@pytest.mark.parametrize("basis", [KLEMS_FULL, KLEMS_HALF])
+def test_neighbours_are_mutual_and_touch(basis) -> None:
+    """A point just beyond each corner and each side's middle of a patch is in a neighbour."""
+    near = neighbours(basis)
+    for k, others in enumerate(near):
+        assert k not in others and all(k in near[other] for other in others)
+    theta, phi = basis.centres()
+    for k in range(1, basis.size):
+        ring, count = basis.rings[k], basis.phi_counts[basis.rings[k]]
+        low, high = basis.theta_bounds[ring], basis.theta_bounds[ring + 1]
+        step = 1e-6
+        beyond = [(theta[k], phi[k] + side * (np.pi / count + step)) for side in (-1, 1)]
+        beyond += [(low - step, phi[k] + side * (np.pi / count - step)) for side in (-1, 0, 1)]
+        if high < np.pi / 2 - step:
+            beyond += [(high + step, phi[k] + side * (np.pi / count - step)) for side in (-1, 0, 1)]
+        assert {int(basis.index(*one)) for one in beyond} <= set(near[k].tolist())
+
+
+def test_a_beam_is_taken_from_the_diagonal_first() -> None:
+    """Of T with 0.5 straight on and 0.2 beside it, a beam of 0.6 has 0.5 and 0.1 there."""
+    omega, k = KLEMS_FULL.projected_solid_angles(), 5
+    beside = next(j for j in neighbours(KLEMS_FULL)[k] if KLEMS_FULL.rings[j] == KLEMS_FULL.rings[k])
+    transmission = np.zeros((KLEMS_FULL.size, KLEMS_FULL.size))
+    transmission[k, k], transmission[beside, k] = 0.5, 0.2
+    beams = np.zeros(KLEMS_FULL.size)
+    for beam, straight, aside in ((0.3, 0.3, 0.0), (0.6, 0.5, 0.1), (0.9, 0.5, 0.2)):
+        beams[k] = beam
+        held = held_beams(transmission, beams, KLEMS_FULL) * omega[:, None] / omega
+        assert held[k, k] == pytest.approx(straight) and held[beside, k] == pytest.approx(aside)
+        assert held.sum() == pytest.approx(straight + aside)
+
+
+def test_what_is_around_a_peak_is_a_mean_over_its_solid_angle() -> None:
+    """A leaf one level up has four times the solid angle of the smallest."""
+    value, depth = np.array([[900.0, 5.0, 1.0, 0.0]]), np.array([[6, 5, 6, -1]])
+    peak, around = _peak(value, depth, 6)
+    assert peak.tolist() == [[True, False, False, False]]
+    assert around == pytest.approx([(4 * 5.0 + 1.0) / 5])

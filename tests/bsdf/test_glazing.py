@@ -10,6 +10,7 @@ import pytest
 
 from mitsuba_cfs.bsdf.glazing import (
     Pane,
+    absorbed_by_layers,
     hemispherical_mean,
     pane_optics,
     pane_values,
@@ -166,3 +167,18 @@ def test_a_ring_has_the_pane_at_the_middle_of_its_projected_area():
     rings = np.repeat(pane_values(pane, theta)[0], KLEMS_FULL.phi_counts)
     through = np.diag(found.transmission_front) * KLEMS_FULL.projected_solid_angles()
     np.testing.assert_allclose(through, rings, rtol=1e-9)
+
+
+def test_panes_and_a_shade_absorb_what_neither_passes_nor_returns():
+    """Two panes share it as in the stack of both; one shade may be among them, not two."""
+    outer, inner = Pane("outer", 0.6, 0.2, 0.2), Pane("inner", 0.8, 0.1, 0.1)
+    tau, rho = stack([pane_optics(one, ANGLES) for one in (outer, inner)]).tau, np.full(len(ANGLES), 0.1)
+    absorbed = absorbed_by_layers([outer, inner], tau, rho, ANGLES)
+    np.testing.assert_allclose(absorbed.sum(axis=1), 1 - tau - rho)
+    # at normal incidence by the geometric series of light between them
+    first, second = 0.2 + 0.6 * 0.1 * 0.2 / (1 - 0.2 * 0.1), 0.6 * 0.1 / (1 - 0.2 * 0.1)
+    assert absorbed[0, 0] / absorbed[0, 1] == pytest.approx(first / second)
+    shaded = absorbed_by_layers([outer, None, inner], 0.2 * tau, rho, ANGLES)
+    np.testing.assert_allclose(shaded.sum(axis=1), 1 - 0.2 * tau - rho)
+    with pytest.raises(ValueError, match="at most one shade"):
+        absorbed_by_layers([None, outer, None], tau, rho, ANGLES)

@@ -88,6 +88,15 @@ def test_a_polar_angle_beyond_the_hemisphere_is_refused():
     for theta in ([0.1, 1.6], [-0.1, 0.1]):
         with pytest.raises(ValueError, match="expected 0 to pi / 2"):
             KLEMS_FULL.index(theta, [0.0, 0.0])
+    assert KLEMS_FULL.index(np.pi / 2, 0.0) == KLEMS_FULL.index(np.radians(80), 0.0)  # along the window
+
+
+def test_light_from_indoors_comes_from_the_other_side_of_the_window():
+    """Window frame: z points outdoors; both sides have the same azimuths and heights."""
+    outside, inside = KLEMS_FULL.incident_directions(), KLEMS_FULL.incident_directions(back=True)
+    assert (outside[:, 2] > 0).all()
+    np.testing.assert_array_equal(inside, outside * [1, 1, -1])
+    np.testing.assert_array_equal(KLEMS_FULL.outgoing_directions(front=True), -outside * [1, 1, -1])
 
 
 def evaluate(system: KlemsBsdf, incident, outgoing):

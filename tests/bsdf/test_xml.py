@@ -110,7 +110,7 @@ BROKEN = {
     "wrong basis": (lambda t: t.replace("LBNL/Klems Quarter</Col", "LBNL/Klems Full</Col"), "145"),
     "unknown basis": (lambda t: t.replace("LBNL/Klems Quarter</Row", "mine</Row"), "mine"),
     "not finite": (lambda t: t.replace("<ScatteringData>", "<ScatteringData>nan, ", 1), "not finite"),
-    "not a number": (lambda t: t.replace("<ScatteringData>", "<ScatteringData>x", 1), "number"),
+    "not a number": (lambda t: t.replace("<ScatteringData>", "<ScatteringData>1, x7, ", 1), "not a number: 'x7'"),
     "gains energy": (lambda t: t.replace("<ScatteringData>\n0", "<ScatteringData>\n1000", 1), "scatters"),
     "structure": (lambda t: t.replace(">Columns<", ">Heaps<"), "Heaps"),
     "no basis": (lambda t: t.replace("ColumnAngleBasis", "Kolumn"), "ColumnAngleBasis"),
@@ -208,3 +208,12 @@ def test_the_type_of_a_device_is_other_where_none_is_stated(text, tmp_path, elem
     changed = re.sub("<DeviceType>[^<]*</DeviceType>", element, text)
     assert changed != text or element
     assert read_bsdf_xml(write(tmp_path, changed)).device_type == expected
+
+
+def test_a_ring_around_the_normal_of_several_patches_has_its_own_middle(tmp_path):
+    """Only a single patch lies at 0 degrees; the middle of other rings is that of their bounds."""
+    basis = KlemsBasis("four in the middle", (0.0, np.pi / 6, np.pi / 2), (4, 2))
+    block = np.zeros((6, 6))
+    file = tmp_path / "b.xml"
+    write_bsdf_xml(BsdfFile({"Visible": KlemsBsdf(basis, basis, block, block, block, block)}), file)
+    assert re.findall("<Theta>(.*?)</Theta>", file.read_text()) == ["15", "60"]

@@ -185,6 +185,12 @@ def test_readings_are_averaged_over_the_weathers_steps(tmp_path):
 WRONG = {
     "no column": ('column = "air"', 'column = "lounge"', "no column 'lounge'; there are time, air"),
     "no key": ('key = "system.g_value"', 'key = "system.g_valu"', "expected a number of the study at 'system.g_valu'"),
+    "too deep": ('key = "system.g_value"', f'key = "{500 * "a."}b"', "parameter.1.key: expected a text of at most 200"),
+    "under a number": (
+        'key = "system.g_value"',
+        'key = "air.infiltration_ach.x"\nmean = 0.6',
+        "parameter g: there is no table to set 'x' in, but 0.",
+    ),
     "no deviation": ("deviation = 1.5\n", "", "parameter.2.deviation: is missing"),
     "mean outside": ("low = 0.54", "low = 0.62", "expected a mean from 0.62 to 0.75, got 0.6"),
     "point of air": (

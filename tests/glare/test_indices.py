@@ -234,3 +234,15 @@ def test_a_source_too_small_for_the_discomfort_rating_is_no_glare():
     rating = indices.discomfort_glare_rating([1e6, 1e6], [1e-7, 1e-7], [1.0, 1.0], 100.0)
     assert rating == 0.0
     assert indices.visual_comfort_probability(rating) == 100.0
+
+
+def test_angles_of_unit_vectors_are_numbers():
+    """A unit vector times itself is 1 plus or minus a rounding, whose arc cosine there is not."""
+    random = np.random.default_rng(3)
+    for along, up in random.normal(size=(300, 2, 3)):
+        view = fisheye((0.0, 0.0, 0.0), along, 64, up=up / np.linalg.norm(up))
+        _, across, forward = frame(view)
+        assert view_angles([forward], view)[0] == pytest.approx(0.0, abs=1e-7)
+        above = np.cos(0.3) * forward + np.sin(0.3) * across  # tau is 0 where the given up is across the view
+        (sigma,), (tau,), (below,) = view_angles([above], fisheye((0.0, 0.0, 0.0), along, 64, up=across))
+        assert sigma == pytest.approx(0.3) and tau == pytest.approx(0.0, abs=1e-6) and not below

@@ -163,3 +163,13 @@ def test_a_parallel_view_has_a_ray_everywhere_along_its_direction():
     directions, exists = rays(view, np.array([0.1, 0.5, 0.9]), np.array([0.2, 0.5, 1.0]))
     assert exists.all()
     np.testing.assert_allclose(directions, [(0.0, 1.0, 0.0)] * 3)
+
+
+def test_pixels_across_the_rim_of_a_hemisphere_have_no_solid_angle():
+    """Of a hemispherical picture a pixel counts whole or not at all: its corners lie within the unit circle."""
+    size = 40
+    omega = pixel_solid_angles(fisheye((0, 0, 0), (0, 1, 0), size, kind="hemispherical"))
+    edges = np.abs(np.linspace(-1, 1, size + 1))
+    farthest = np.maximum(edges[:-1], edges[1:])
+    corner = np.hypot(farthest[:, None], farthest)
+    assert (omega[corner < 1 - 1e-9] > 0).all() and (omega[corner > 1 + 1e-9] == 0).all()

@@ -171,6 +171,7 @@ def test_weights_and_limits_that_cannot_be() -> None:
         ([[1.0]], [1.0], "expected illuminance"),
         ([[1.0]], [False], "no time step"),
         ([[-1.0]], [True], "not negative"),
+        ([[500.0, -1.0]], [True], "not negative"),
         ([[np.inf]], [True], "finite"),
         ([[np.nan]], [True], "finite"),
     ):

@@ -324,3 +324,7 @@ def test_the_daylight_factor_is_a_share_of_the_light_outdoors():
     for wrong in (-1.0, np.nan, np.inf):
         with pytest.raises(ValueError, match="illuminance: expected finite values"):
             daylight_factor([100.0, wrong], 1e4)
+
+
+def test_a_factor_is_of_any_light_outdoors():
+    np.testing.assert_allclose(daylight_factor([0.1], 0.5), [0.2])

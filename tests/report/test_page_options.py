@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import re
+import zlib
 
 import pytest
 from PIL import Image
@@ -126,6 +127,7 @@ LOGO = "data:image/svg+xml;base64," + base64.b64encode(SVG.encode()).decode()
         ("logo = 'other.xml'", "logo: {folder}/other.xml is no PNG, JPEG or SVG picture"),
         ("logo = 'big.svg'", "logo: {folder}/big.svg has 500 kB; at most 500 kB"),
         ("logo = 'wide.png'", "logo: {folder}/wide.png has 4001 x 1 pixels; at most 4000 a side"),
+        ("logo = 'lies.png'", "logo: {folder}/lies.png is no PNG, JPEG or SVG picture"),
         ("logo = '.'", "logo: {folder} cannot be read: "),
     ],
 )
@@ -134,6 +136,9 @@ def test_what_is_wrong_is_one_line(tmp_path, text, words) -> None:
     (tmp_path / "cut.png").write_bytes(picture("png", (900, 900))[:60])
     (tmp_path / "other.xml").write_text("<a/>")
     (tmp_path / "big.svg").write_text(SVG + " " * LOGO_BYTES)
+    lies = picture("png", (9, 9))  # its header says that it has 3.6 gigapixels, which must not be made
+    head = lies[12:16] + (60_000).to_bytes(4) * 2 + lies[24:29]
+    (tmp_path / "lies.png").write_bytes(lies[:12] + head + zlib.crc32(head).to_bytes(4) + lies[33:])
     (tmp_path / "wide.png").write_bytes(picture("png", (4001, 1)))
     path = page_file(tmp_path, text)
     with pytest.raises(DataError) as error:

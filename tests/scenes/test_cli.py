@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -13,7 +15,9 @@ from collections.abc import Callable
 import click
 import pydantic
 import pytest
+import trimesh
 
+from bim.surroundings.placement import read_surroundings
 from mitsuba_cfs.errors import DataError, VariantError
 from scenes import cli
 from scenes.commands.progress_bar import ProgressBar
@@ -314,3 +318,23 @@ def test_a_second_signal_does_not_end_the_cleaning_up():
         preexec_fn=default_signals,
     )
     assert (process.returncode, process.stdout, process.stderr) == (130, "cleaned up\n", "")
+
+
+def test_a_librarys_warning_is_its_message_alone(tmp_path, capsys):
+    """A library may log a failure with its traceback, as trimesh does for a damaged STL file."""
+    mesh = trimesh.creation.box((1.0, 2.0, 3.0)).export(file_type="stl_ascii")
+    file = tmp_path / "m.stl"
+    file.write_text(re.sub("facet normal [^ ]*", "facet normal x", mesh, count=1))
+    before = logging.getLogger().handlers[:]
+    try:
+        assert cli.run(["sky", "cie", "overcast", str(tmp_path / "a.smx")]) == 0  # logs as every command does
+        capsys.readouterr()
+        assert read_surroundings(file).objects
+        assert capsys.readouterr().err == ""
+        try:
+            raise ValueError("inner")
+        except ValueError:
+            logging.getLogger("a_library").warning("cannot do this", exc_info=True)
+        assert capsys.readouterr().err == "warning: cannot do this\n"
+    finally:
+        logging.getLogger().handlers[:] = before

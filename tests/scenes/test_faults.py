@@ -37,20 +37,37 @@ pytestmark = pytest.mark.early
 WRITES_NOTHING = {"doctor", "bsdf check", "bsdf info", "bsdf eval", "ifc query"}
 SERVES = {"app"}  # until Ctrl-C: its files are those of tests/app, of the commands that it runs
 EARLIER_NAMES = {"ifc check", "ifc export"}  # of `check` and `export`
+# Inputs; and a list that no command replaces
+NOT_TRIED = {"--geometry", "--product", "--fabrics", "--spectrum", "--fix"}
 SHOWN = ("thermal", "sky wea")  # of those that need a process of their own, the rest slow
 PROCESSES = [pytest.param(n, marks=() if n in SHOWN else pytest.mark.slow) for n in JOBS]
 PIPES = [pytest.param(n, marks=() if n == "sky wea" else pytest.mark.slow) for n in JOBS]
 
 
-def test_every_command_that_writes_is_in_the_list() -> None:
-    context = click.Context(cli.cfs)
-    leaves = set()
+def commands() -> dict[str, click.Command]:
+    """Every command by the words that call it."""
+    context, leaves = click.Context(cli.cfs), {}
     for name in cli.COMMANDS:
         command = cli.cfs.get_command(context, name)
         inner = getattr(command, "commands", None)
-        leaves |= {name} if inner is None else {f"{name} {one}" for one in inner}
+        leaves |= {name: command} if inner is None else {f"{name} {key}": one for key, one in inner.items()}
+    return leaves
+
+
+def test_every_command_that_writes_is_in_the_list() -> None:
+    leaves = commands().keys()
     listed = {next((leaf for leaf in leaves if f"{job} ".startswith(f"{leaf} ")), job) for job in JOBS}
     assert listed | WRITES_NOTHING | SERVES | EARLIER_NAMES == leaves
+
+
+def test_every_option_that_names_an_output_is_in_the_list(tmp_path) -> None:
+    words = [" ".join(Place(job, tmp_path, tmp_path / job.name).words) for job in JOBS.values()]
+    for name, command in commands().items():
+        for option in command.params:
+            path = isinstance(option, click.Option) and isinstance(option.type, click.Path) and not option.type.exists
+            if path and not NOT_TRIED & {*option.opts} and name not in EARLIER_NAMES:
+                called = [one.split() for one in words if one.startswith(f"{name} ")]
+                assert any({*option.opts} & {*one} for one in called), f"{name} {option.opts}"
 
 
 def fill(disk: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from mitsuba_cfs.errors import DataError
@@ -142,3 +143,21 @@ def test_gaps_are_counted_in_hours_and_snow_needs_temperatures(weather):
     np.testing.assert_allclose(halves.albedo, 0.3)
     bare = replace(snowed(weather), dry_bulb_c=None)
     assert with_albedo(bare, None) is bare
+
+
+def test_snow_of_half_hours_is_counted_in_hours(weather):
+    """100 steps of half an hour are 50 hours, for which there is no note; 200 are 100."""
+
+    def half(values):
+        return np.repeat(values, 2)
+
+    day = weather.direct_normal + weather.diffuse_horizontal > 0
+    steps = np.flatnonzero(half(day))
+    ends = pd.date_range(weather.times[0] - pd.Timedelta(minutes=30), periods=17520, freq="30min")
+    for count, noted in ((100, False), (198, False), (200, True)):
+        depth = np.zeros(17520)
+        depth[steps[:count]] = 5.0
+        series = {name: half(getattr(weather, name)) for name in weather.series()}
+        fine = replace(weather, **series | {"times": ends, "step_h": 0.5, "notes": ()})
+        cold = replace(fine, dry_bulb_c=np.full(17520, -1.0), snow_depth_cm=depth)
+        assert bool(with_albedo(cold, None).notes) == noted

@@ -88,3 +88,14 @@ def test_numbers_of_hours():
     for wrong in ([5], [-1], [[0]]):
         with pytest.raises(ValueError, match="hours: expected numbers from 0 to 4"):
             hour_numbers(wrong, 5)
+
+
+def test_a_result_of_the_weather_is_made_once_for_its_arguments(sky):
+    calls = []
+
+    def doubled(weather, number):
+        calls.append(number)
+        return 2 * number
+
+    assert [sky.once(doubled, "weather", number) for number in (3, 3, 4)] == [6, 6, 8]
+    assert calls == [3, 4]

@@ -239,3 +239,11 @@ def test_gradation_of_the_horizon_and_the_floor_of_zero():
     negative = coefficients.copy()
     negative[0] = -5.0
     assert perez.relative_luminance(negative, np.array([1.0]), np.array([[0.5]])) == 0.0
+
+
+def test_a_sun_in_the_zenith_is_one_though_its_vector_is_rounded():
+    """A height of 1 plus a rounding has no arc cosine; the sun is then as high as the model takes it."""
+    over, exact = (perez.perez_sky(700.0, 100.0, [[0.0, 0.0, z]], day_of_year=DAY) for z in (1.0 + 2.3e-16, 1.0))
+    for name in ("coefficients", "sun", "clearness", "brightness", "diffuse_efficacy", "direct_efficacy"):
+        np.testing.assert_array_equal(getattr(over, name), getattr(exact, name))
+        assert np.isfinite(getattr(over, name)).all()

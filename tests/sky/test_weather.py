@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from weather_files import epw_rows, write_epw
@@ -405,6 +407,7 @@ weather_data_file_units {unit}
         ("1 1 1.5 0 0\n1 1 0.5 0 0\n", ("line 8", "out of order")),
         ("1 1 0.5 0 0\n1 1 1.5 0 0\n", ("8760 or 8784", "2 rows")),
         ("2 30 0.5 0 0\n", ("line 7", "not a date")),
+        ("1 1 24.5 0 0\n", ("line 7", "not a date")),
     ],
 )
 def test_wea_faults(tmp_path, rows, words):
@@ -426,3 +429,17 @@ def test_wea_of_some_hours_and_of_horizontal_direct(tmp_path):
     noon = np.radians([42.0, 65.4])
     np.testing.assert_allclose(weather.direct_normal[:2], [300, 700] / np.sin(noon), rtol=0.015)
     assert weather.direct_normal[2] == 0
+
+
+def test_rain_is_the_epws_liquid_precipitation(tmp_path, year):
+    """N33 of the data dictionary [mm]; N34 beside it is the hours that it fell in."""
+    for number, row in enumerate(year):
+        row[33:35] = ["7.5" if number < 10 else "0", "1"]
+    weather = read_epw(write_epw(tmp_path / "a.epw", year))
+    np.testing.assert_allclose(weather.rain_mm[:11], [7.5] * 10 + [0.0])
+
+
+def test_steps_of_a_day_go_by_their_length(tmp_path, year):
+    """24 of an hour, 48 of half an hour, 1,440 of a minute."""
+    weather = read_epw(write_epw(tmp_path / "a.epw", year))
+    assert [replace(weather, step_h=step).per_day for step in (1.0, 0.5, 1 / 60)] == [24, 48, 1440]

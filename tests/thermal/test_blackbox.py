@@ -14,11 +14,14 @@ from thermal.blackbox import (
     LayerAbsorptances,
     LayerResistance,
     ShadeNode,
+    absorbed_at_u,
+    conductance_table,
     fit_conductance_surface,
     layer_absorptances,
     linear_u,
     node_absorptances,
     with_realised_films,
+    with_u_value,
 )
 from thermal.errors import ThermalInputError
 
@@ -173,3 +176,45 @@ def test_bounds_of_a_fenestration(changes, allowed):
     else:
         with pytest.raises(ThermalInputError, match="fenestration x"):
             Fenestration(**values)
+
+
+def test_a_table_is_linear_along_both_axes():
+    """A bilinear function comes back between the points, with steps other than 1; beyond them that of the edge."""
+    means, apart = np.array([-5.0, 5.0, 15.0]), np.array([2.0, 6.0, 10.0, 14.0])
+
+    def conductance(mean, difference):
+        return 1.0 + 0.02 * mean + 0.03 * difference + 0.001 * mean * difference
+
+    resistance = conductance_table(means, apart, conductance(means[:, None], apart))
+    for mean, difference in ((-5.0, 2.0), (-1.0, 3.0), (7.5, 9.0), (14.0, 13.0), (15.0, 14.0)):
+        assert 1 / resistance.at(mean, difference) == pytest.approx(conductance(mean, difference))
+    assert 1 / resistance.at(40.0, 50.0) == pytest.approx(conductance(15.0, 14.0))
+    assert 1 / resistance.at(-40.0, 0.0) == pytest.approx(conductance(-5.0, 2.0))
+
+
+SURFACE = LayerResistance("surface", (1.2, 0.01, 0.02, 0.0005, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("resistance", [None, LayerResistance("constant", (0.7,)), linear_u(1.3), SURFACE])
+@pytest.mark.parametrize("u_value", [0.9, 1.6])
+def test_another_u_adds_its_resistance_at_the_measuring_condition(resistance, u_value):
+    """1/U' - 1/U is all between the layers, at 10 degC and the difference between them of 15 K of air."""
+    one = Fenestration("pane", 1.3, resistance=resistance)
+    moved = with_u_value(one, u_value)
+    between = 15.0 * (1 - 1.3 * (one.r_outer + one.r_inner))
+    more = moved.layer_resistance.at(10.0, between) - one.layer_resistance.at(10.0, between)
+    assert more == pytest.approx(1 / u_value - 1 / 1.3)
+
+
+def test_sun_in_the_layers_of_another_u_keeps_its_heat_indoors_where_it_can():
+    """g stays where both layers can share the sun; a warmer outer layer alone cannot give away more."""
+    one, better, worse = (Fenestration("pane", u) for u in (1.3, 0.9, 2.6))
+    outer, inner = np.array([0.2, 0.1]), np.array([0.0, 0.1])
+    for moved in (better, worse):
+        to_outer, to_inner = absorbed_at_u(one, moved, outer, inner)
+        np.testing.assert_allclose(to_outer + to_inner, outer + inner)
+        assert to_inner.min() >= 0
+    (of_outer, _, of_inner), (now_outer, _, now_inner) = one.inward_shares(), better.inward_shares()
+    to_outer, to_inner = absorbed_at_u(one, better, outer, inner)
+    np.testing.assert_allclose(now_outer * to_outer + now_inner * to_inner, of_outer * outer + of_inner * inner)
+    assert absorbed_at_u(one, worse, outer, inner)[1][0] == 0.0

@@ -7,10 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.thermal.rooms import CONCRETE, INSULATION
+from tests.thermal.rooms import CONCRETE, INSULATION, box, climate
 from tests.validation.room_exchange import absorbed_after_reflections, area_view_factors, spread_evenly, window_share
-from thermal.blackbox import Fenestration
+from thermal.balance import BalanceOptions, simulate
+from thermal.blackbox import Fenestration, LayerResistance
+from thermal.climate import no_sun
 from thermal.convection import doe2_outside, iso15099_inside, local_wind_factor, tarp_inside
+from thermal.emitters import IdealLoads
 from thermal.errors import ThermalInputError
 from thermal.network import (
     OUTDOOR,
@@ -28,6 +31,8 @@ from thermal.network import (
     window_mix,
 )
 from thermal.zone import OpaqueSurface, WindowElement, Zone
+
+OPTIONS = BalanceOptions(warm_tolerance=1e-9, warm_days=2000, tolerance=1e-9, iterations=20)
 
 
 def test_parallel_plates_exchange_by_the_closed_form():
@@ -354,3 +359,23 @@ def test_a_window_of_fewer_states_keeps_its_last():
     zone = _shaded_windows()
     net = _network([zone])
     np.testing.assert_allclose(net.glass.emissivity_out, [[0.8, 0.7], [0.8, 0.8]])
+
+
+def test_a_resistance_is_the_same_in_every_form():
+    """0.6 m2 K/W as a constant, a line, a surface and a table: the room's steady load is that of all."""
+    films, constant = 0.04 + 0.13, 0.6
+    forms = {
+        "constant": (constant,),
+        "linear U": (1 / (constant + films), 0.0, films),
+        "surface": (1 / constant, 0.0, 0.0, 0.0, 0.0, 0.0),
+        "table": (-20.0, 30.0, 2.0, 0.0, 30.0, 2.0, *(1 / constant,) * 4),
+    }
+    loads = []
+    for kind, coefficients in forms.items():
+        glass = Fenestration("pane", 1 / (constant + films), resistance=LayerResistance(kind, coefficients))
+        room = box(window=glass, outside="adiabatic", infiltration_ach=0.0, loads=IdealLoads(20.0, 20.0))
+        result = simulate(room, climate(24, outdoor=2.0), no_sun(24, 6, 1), options=OPTIONS)
+        loads.append(float((result.heating - result.cooling)[-1]))
+    glass, wall = 4.5 / (constant + films), 7.5 / (films + INSULATION.resistance + CONCRETE.resistance)
+    assert loads[0] == pytest.approx((glass + wall) * 18.0, rel=0.25)  # films are those of the weather
+    np.testing.assert_allclose(loads, loads[0], rtol=1e-9)

@@ -15,6 +15,7 @@ from scenes.fenestration.thermal_file import ThermalFile
 from scenes.fenestration.thermal_system import sun_in_layers
 from thermal.glazing import Gap, en410_g_value, en673_u_value, gap_conductances
 from thermal.glazing_unit import GasGap, GlazingLayer, GlazingUnit, sheet_layer
+from thermal.iso15099 import Conditions, Environment, iso15099_g_values, iso15099_u_value
 from thermal.ratings import REFERENCE_GLAZINGS, ThermalRating, _known_to_en673, layered_ratings, shade_ratings
 
 
@@ -248,3 +249,17 @@ def test_european_rating_of_three_panes_by_the_formulas():
     between = 1 / gap_conductances(own, "vertical") + (solid[:-1] + solid[1:]) / 2
     expected = float(en410_g_value(np.array([0.5]), np.array([alpha]), between)[0])
     assert rating.g_value == pytest.approx(expected)
+
+
+def test_u_is_that_of_the_winter_of_nfrc_and_g_of_its_summer():
+    """NFRC 100: -18 and 21 degC, 5.5 m/s, where the gas moves more than between 32 and 24 degC."""
+    clear = GlazingLayer(0.004, 1.0, (0.837, 0.837), solar=(0.83, 0.075, 0.075))
+    unit = GlazingUnit((clear, clear), (GasGap(0.012, (("air", 1.0),)),))
+    nfrc = layered_ratings(unit, 0.7, np.array([0.1, 0.08]))[0]
+    winter = Conditions(Environment(-18.0, 4 + 4 * 5.5), Environment(21.0, None))
+    summer = Conditions(Environment(32.0, 4 + 4 * 2.75), Environment(24.0, None), 783.0)
+    assert nfrc.method == "NFRC"
+    assert nfrc.u_value == pytest.approx(iso15099_u_value(unit, winter), abs=1e-12)
+    assert nfrc.u_value != pytest.approx(iso15099_u_value(unit, summer), abs=0.02)
+    g = iso15099_g_values(unit, summer, np.array([0.7]), np.array([[0.1, 0.08]]))[0]
+    assert nfrc.g_value == pytest.approx(g, abs=1e-12)
