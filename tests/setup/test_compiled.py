@@ -213,7 +213,7 @@ def entry_of_a_test() -> None:
     """Its source file is what two processes lock."""
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="files are locked by fcntl")
+@pytest.mark.skipif(sys.platform == "win32", reason="locks of files are those of Linux")
 def test_who_must_compile_waits_for_a_process_that_is_at_it_as_long_as_this_lives() -> None:
     def start(code: str) -> subprocess.Popen:
         return subprocess.Popen([sys.executable, "-c", code], cwd=REPOSITORY, stdout=subprocess.PIPE, text=True)
