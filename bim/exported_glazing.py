@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from bim.energyplus_windows import WindowOptics
-from bim.model import Window
+from bim.model import Space, Window
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf, BsdfFile
 from mitsuba_cfs.bsdf.evaluate import klems_of
 
@@ -23,6 +23,7 @@ class ExportedGlazing:
     optics: WindowOptics | None = None  # matrices and layers for EnergyPlus
 
 
+LEFT_TO_READER = "is left to the program that reads the file"  # the ground of `left_out`
 Glazings = Mapping[str, ExportedGlazing]  # by window GUID
 
 
@@ -49,6 +50,24 @@ def without_bsdf(windows: Iterable[Window], glazings: Glazings, model: str) -> t
         f"{model} holds no BSDF: windows of {sum(scattering.values()):.1f} m2 have U, g and "
         "transmittance at normal incidence there",
     )
+
+
+def left_out(spaces: Iterable[Space], model: str, ground: str) -> Iterator[str]:
+    """Sentences on glass between rooms, by name, and on the ground, which a format's file lacks.
+
+    Args: ground: what the file has of it, in place of the soil of ISO 13370.
+    """
+    faces = [face for space in spaces for face in space.faces]
+    panes = {face.pane.guid: face.pane for face in faces if face.pane is not None and not face.pane.is_open}
+    if panes:
+        names = ", ".join(sorted({pane.name or guid for guid, pane in panes.items()}))
+        yield f"{model}: glass between rooms is written as an opaque wall: {names}"
+    area = sum(face.area for face in faces if face.adjacency == "ground")
+    if area:
+        yield (
+            f"{model}: the ground at {area:.0f} m2 {ground}; soil by ISO 13370 with the building's area and "
+            "perimeter, as in the heat balance here, is not written"
+        )
 
 
 def normal_transmittance(bsdf: Bsdf) -> float:

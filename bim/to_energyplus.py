@@ -28,7 +28,7 @@ from bim.energyplus_parts import (
     write_window,
 )
 from bim.energyplus_windows import complex_state
-from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of
+from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of, left_out
 from bim.model import Building, Construction, Face, Space, Window
 from bim.planes import newell_normal
 from bim.to_thermal import layers_of
@@ -110,12 +110,8 @@ def _losses(spaces: Sequence[Space], dropped: Sequence[float], *, ground: bool) 
             f"EnergyPlus: {len(dropped)} surfaces of {sum(dropped):.2g} m2 in all are left out: it "
             "merges corners within a centimetre"
         )
-    area = sum(f.area for s in spaces for f in s.faces if f.adjacency == "ground")
-    if ground and area:
-        yield (
-            f"EnergyPlus: no temperature is given of the ground below {area:.0f} m2: it takes "
-            f"{DEFAULT_GROUND_C:g} C all year"
-        )
+    kept = f"has no given temperature: EnergyPlus takes {DEFAULT_GROUND_C:g} C all year"
+    yield from left_out(spaces, "EnergyPlus", kept if ground else "has the given monthly temperatures")
 
 
 def _zone(model: Model, zone: str, space: Space, windows: _Windows, air_changes: float) -> list[float]:

@@ -14,7 +14,7 @@ import shapely
 from bim.defaults import WINDOW_FRAME
 from bim.doorways import Key, touching
 from bim.energyplus_parts import at_most_layers
-from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of, without_bsdf
+from bim.exported_glazing import LEFT_TO_READER, ExportedGlazing, Glazings, glazing_of, left_out, without_bsdf
 from bim.hosted_windows import HostedPolygon, hosted_polygons
 from bim.model import Building, Element, Face, MaterialLayer, Space, Window
 from bim.planes import Plane, planar_facets, rings_of, without_holes
@@ -34,7 +34,7 @@ def write_gbxml(building: Building, path: str | PathLike[str], *, glazing: Glazi
 
     Args: glazing: of windows by GUID, in place of what the building states.
 
-    Returns: a sentence on the BSDF that are left out.
+    Returns: sentences on BSDF, inner glass and the ground, which are left out.
     """
     units = {
         "temperatureUnit": "C",
@@ -76,7 +76,8 @@ def write_gbxml(building: Building, path: str | PathLike[str], *, glazing: Glazi
     ElementTree.indent(root)
     text = ElementTree.tostring(root, encoding="unicode")
     write_text(Path(path), f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n')
-    return without_bsdf(building.windows, glazing or {}, "gbXML")
+    lost = left_out(building.spaces, "gbXML", LEFT_TO_READER)
+    return (*without_bsdf(building.windows, glazing or {}, "gbXML"), *lost)
 
 
 class _Writer:

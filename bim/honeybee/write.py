@@ -17,7 +17,7 @@ import shapely
 
 from bim.doorways import Key, touching
 from bim.energyplus_parts import at_most_layers
-from bim.exported_glazing import ExportedGlazing, Glazings, glazing_of, without_bsdf
+from bim.exported_glazing import LEFT_TO_READER, ExportedGlazing, Glazings, glazing_of, left_out, without_bsdf
 from bim.fenestration import pane_transmissivity
 from bim.hosted_windows import HostedPolygon, hosted_polygons
 from bim.model import Building, Construction, Element, Face, Space, Window
@@ -45,7 +45,7 @@ def write_honeybee(
 
     Args: glazing: of windows by GUID, in place of what the building states.
 
-    Returns: a sentence on the windows whose BSDF only the light has.
+    Returns: sentences on windows whose BSDF only the light has, on inner glass and on the ground.
     """
     library = _Library(glazing or {})
     names = _Names()
@@ -68,7 +68,8 @@ def write_honeybee(
         "properties": {"type": "ModelProperties", "energy": library.energy(), "radiance": library.radiance()},
     }
     write_text(Path(path), json_text(model, indent=1) + "\n")
-    return without_bsdf(building.windows, glazing or {}, "Honeybee's energy model")
+    lost = left_out(building.spaces, "Honeybee", LEFT_TO_READER)
+    return (*without_bsdf(building.windows, glazing or {}, "Honeybee's energy model"), *lost)
 
 
 class _Names:

@@ -231,8 +231,8 @@ def test_a_bsdf_and_its_u_g_and_tau_go_to_honeybee_and_gbxml(tmp_path):
     glazing, _ = known_fenestration(building.spaces, tmp_path / "attached.ifc").glazings()
     (first, *_) = glazing.values()
     for write, name in ((write_honeybee, "a.hbjson"), (write_gbxml, "a.gbxml")):
-        (note,) = write(building, tmp_path / name, glazing=glazing)
-        assert "holds no BSDF: windows of" in note
+        note, ground = write(building, tmp_path / name, glazing=glazing)
+        assert "holds no BSDF: windows of" in note and "the ground at" in ground
         assert write(shoebox(4, 5, 3, windows=WINDOWS), tmp_path / f"plain {name}") == ()
     model = json.loads((tmp_path / "a.hbjson").read_text())
     (material,) = [
@@ -275,13 +275,29 @@ def test_an_epjson_names_what_energyplus_is_not_told(tmp_path):
     """The ground's temperature, slivers that it merges away, and a BSDF that lies on its side."""
     building = shoebox(4, 5, 3, windows=WINDOWS, adjacency={"floor": "ground"})
     (space,) = building.spaces
-    assert not write_epjson(building, tmp_path / "a.epJSON", ground_c=[9.0] * 12)
+    (given,) = write_epjson(building, tmp_path / "a.epJSON", ground_c=[9.0] * 12)
+    assert "the ground at 20 m2 has the given monthly temperatures" in given and "ISO 13370" in given
     (ground,) = write_epjson(building, tmp_path / "a.epJSON")
-    assert "ground below 20 m2: it takes 18 C" in ground
+    assert "the ground at 20 m2 has no given temperature: EnergyPlus takes 18 C" in ground
     sliver = np.array([[[0, 0, 0], [4, 0, 0], [4, 0.004, 0]]], dtype=float)
     narrow = replace(space, faces=(*space.faces, replace(space.faces[0], triangles=sliver)))
-    (lost,) = write_epjson(replace(building, spaces=(narrow,)), tmp_path / "b.epJSON", ground_c=[9.0] * 12)
+    lost, _ = write_epjson(replace(building, spaces=(narrow,)), tmp_path / "b.epJSON", ground_c=[9.0] * 12)
     assert "1 surfaces of 0.008 m2 in all are left out" in lost
+
+
+@pytest.mark.parametrize(("write", "model"), [(write_honeybee, "Honeybee"), (write_gbxml, "gbXML")])
+def test_honeybee_and_gbxml_name_ground_and_glass_that_are_not_written(tmp_path, write, model):
+    """A floor on the ground is written as such, its soil is not; glass to another room is a wall."""
+    building = shoebox(4, 5, 3, windows=WINDOWS, adjacency={"floor": "ground"})
+    (space,) = building.spaces
+    (ground,) = write(building, tmp_path / "a")
+    assert ground.startswith(f"{model}: the ground at 20 m2 is left to the program that reads the file")
+    wall = next(face for face in space.faces if face.kind == "wall")
+    panes = (replace(space.windows[0], name="Fanlight"), replace(space.windows[0], name="Doorway", is_open=True))
+    faces = [replace(wall, name=f"inner {pane.name}", pane=pane) for pane in panes]
+    inner = replace(space, faces=(*space.faces, *faces))
+    glass, _ = write(replace(building, spaces=(inner,)), tmp_path / "b")
+    assert glass == f"{model}: glass between rooms is written as an opaque wall: Fanlight"
 
 
 def test_an_export_takes_the_ground_of_the_weather(tmp_path):
