@@ -35,6 +35,7 @@ from scenes.room.operation import (
     stated_note,
     unstated_note,
     used_operation,
+    weekday_note,
 )
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
@@ -155,6 +156,7 @@ def inputs_of(
         *stated_note(building, "" if operation is None else operation.file.name),
         *_unstated(operation, used, building, heat_of),
         *_ground_notes(operation, building, heat_of),
+        *(() if used is None else weekday_note([used.tables], files.weather)),
         *_state_notes(options, operation, filled, systems, building),
         *(() if operation is None else tilt_note(operation.systems)),
         *unused_rules(tables, filled),

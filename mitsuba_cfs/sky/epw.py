@@ -210,6 +210,7 @@ def read_epw(path: str | PathLike[str]) -> Weather:
         ground_depth_m=depth,
         ground_temperature_c=ground,
         first_weekday=weather_table.epw_first_weekday(head),
+        source=weather_table.epw_source(head),
         notes=(*filled_gaps(column, site.name), *notes, *more),
         file=Path(path),
     )

@@ -55,6 +55,7 @@ class Weather:
     ground_temperature_c: FloatArray | None = None  # [G, 12] monthly, January first
     turned_deg: float = 0.0  # north is so far counter-clockwise of +y, see `turned`
     first_weekday: int | None = None  # of January 1, Monday 0, where the file says it
+    source: str = ""  # of the values, as the file's header and its comments state it
     notes: tuple[str, ...] = ()  # what the reader made up, or found to be odd
     file: Path | None = None  # that it was read from
 

@@ -347,6 +347,12 @@ def epw_location(head: list[str], path: FilePath) -> Location:
     return location(path, name, (latitude, longitude, zone, elevation))
 
 
+def epw_source(head: list[str]) -> str:
+    """Where the values come from: the LOCATION line's source and the comments."""
+    parts = [part.strip() for part in head[0].split(",")]
+    return "; ".join(text for text in (parts[4], *(line.partition(",")[2].strip() for line in head[5:7])) if text)
+
+
 def epw_first_weekday(head: list[str]) -> int | None:
     """Weekday of the first data row, Monday 0; None if the header does not state it."""
     parts = [part.strip().casefold() for part in head[7].split(",")]

@@ -50,6 +50,8 @@ def list_rules(context: click.Context, _: click.Parameter, value: bool) -> None:
         if rule.sites:
             words = [f"'{word}'" for word in rule.sites]
             click.echo(f"  asks for the weather of: {rule.weather_asked} (site or file name has {' or '.join(words)})")
+        if rule.header:
+            click.echo(f"  gives a verdict where the header of the weather file states {' or '.join(rule.header)}")
         for label, sentences in (("included", rule.included), ("left out", rule.left_out)):
             for sentence in sentences:
                 click.echo(f"  {label}: {sentence}")

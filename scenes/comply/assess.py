@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from bim.model import Space
+from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.findings import Findings
 from scenes.comply.needs import Need
 from scenes.comply.openings import openings_of
@@ -14,6 +15,7 @@ from scenes.comply.uses import RoomUse
 from scenes.language.catalogue import N_
 
 NOT_FOR_IT, NOT_COMPUTED = N_("not applicable"), N_("not computed")
+NO_VERDICT = N_("no verdict: weather")  # values in other weather than the rule asks for
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,9 +27,12 @@ class RoomVerdict:
     applies: bool
     values: tuple[tuple[float | None, ...], ...] = ()  # by level, by need
     asked: bool = True  # of this very room; else another one may have it, or none need have it
+    judged: bool = True  # else the weather is not the one that the rule asks for
 
     def level_met(self, number: int) -> bool | None:
         """Whether enough needs of a level are met; None where one was not computed."""
+        if not self.judged:
+            return None
         level = self.criterion.level[number]
         met = [need.met(v) for need, v in zip(level.needs, self.values[number], strict=True)]
         least = len(met) if level.count is None else level.count
@@ -38,6 +43,8 @@ class RoomVerdict:
         """Name of the highest level that is met."""
         if not self.applies:
             return NOT_FOR_IT
+        if not self.judged and any(value is not None for values in self.values for value in values):
+            return NO_VERDICT
         return highest(self.criterion, [self.level_met(i) for i in range(len(self.values))])
 
 
@@ -50,10 +57,13 @@ class BuildingVerdict:
     rooms: int  # that it is for
     values: tuple[float | None, ...]  # by level: what is compared, see `level_value`
     met: tuple[bool | None, ...]  # by level
+    judged: bool = True  # else some room has values, but the weather is not the one that the rule asks for
 
     @property
     def reached(self) -> str:
         """Name of the highest level that is met."""
+        if not self.judged:
+            return NO_VERDICT
         return highest(self.criterion, self.met) if self.rooms else NOT_FOR_IT
 
 
@@ -72,11 +82,17 @@ def values_of(rule: RuleTable, findings: Findings, parts: frozenset[str]) -> dic
 
 
 def assess_room(
-    rules: Mapping[str, RuleTable], values: Mapping[str, Mapping[Need, float | None]], space: Space, use: RoomUse
+    rules: Mapping[str, RuleTable],
+    values: Mapping[str, Mapping[Need, float | None]],
+    space: Space,
+    use: RoomUse,
+    weather: Weather | None = None,
 ) -> Iterator[RoomVerdict]:
     """A room against every criterion.
 
-    Args: values: of every need by rule, see `values_of`.
+    Args:
+        values: of every need by rule, see `values_of`.
+        weather: that a rule must ask for to give a verdict; None: any.
     """
     for name, rule in rules.items():
         for criterion in rule.criterion:
@@ -84,7 +100,8 @@ def assess_room(
                 yield RoomVerdict(name, criterion, False)
                 continue
             found = (tuple(values[name][n] for n in level.needs) for level in criterion.level)
-            yield RoomVerdict(name, criterion, True, tuple(found))
+            judged = weather is None or rule.judges(weather)
+            yield RoomVerdict(name, criterion, True, tuple(found), judged=judged)
 
 
 def applies(criterion: CriterionTable, space: Space, use: RoomUse) -> bool:
@@ -133,7 +150,8 @@ def assess_building(
             value = level_value(level, number, used, named)
             values.append(value)
             met.append(_level_met(level, value))
-        rooms.append(BuildingVerdict(rows[0].rule, rows[0].criterion, len(used), tuple(values), tuple(met)))
+        judged = all(verdict.reached != NO_VERDICT for verdict, _ in used)
+        rooms.append(BuildingVerdict(rows[0].rule, rows[0].criterion, len(used), tuple(values), tuple(met), judged))
     return rooms
 
 

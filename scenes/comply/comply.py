@@ -60,7 +60,7 @@ from scenes.room.heat import heat_alone
 from scenes.room.inputs import RoomInputs, room_inputs, skies_for
 from scenes.room.light import RoomLight, grid_points, room_light
 from scenes.room.luminaires import lamp_spectra
-from scenes.room.operation import Operation, assumed_ground_note, check_states, used_operation
+from scenes.room.operation import Operation, assumed_ground_note, check_states, used_operation, weekday_note
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
 from scenes.room.room import StageTimes, asked_year, inputs_of_room
@@ -560,10 +560,20 @@ class Check:
                     sites=rule.weather_asked,
                     file=weather.site if weather.file is None else weather.file.name,
                 )
+            elif not rule.judges(weather):
+                yield Note(
+                    "{rule}: no verdict, figures only. It asks for weather whose header states {words}; that of "
+                    "{file} does not.",
+                    rule=Note(rule.title),
+                    words=rule.header[0],
+                    file=weather.site if weather.file is None else weather.file.name,
+                )
             for sentence in rule.included:
                 yield Note("{rule}. Included: {what}", rule=Note(rule.title), what=Note(sentence))
             for sentence in rule.left_out:
                 yield Note("{rule}. Left out: {what}", rule=Note(rule.title), what=Note(sentence))
+        fitting = [rule for rule in self.files.rules.values() if rule.fits(weather)]
+        yield from weekday_note([one.operation for rule in fitting for one in rule.setup], weather)
 
     def _took(self, seconds: Mapping[str, float]) -> None:
         """Add what parts of the check took."""
@@ -587,7 +597,7 @@ class Check:
         """A room with windows against all rules."""
         rules, findings = self.files.rules, Findings(self.calendar, view=view, sun=sun)
         values = {name: {**light.values[name], **values_of(rule, findings, RAYS)} for name, rule in rules.items()}
-        verdicts = tuple(assess_room(rules, values, space, use))
+        verdicts = tuple(assess_room(rules, values, space, use, self.files.weather))
         return CheckedRoom(space, use, verdicts, view, sun, light if light.grids else None)
 
     def dark_room(self, space: Space, use: RoomUse) -> CheckedRoom:
@@ -600,7 +610,7 @@ class Check:
         findings = Findings(self.calendar, light, view, SunExposure((), ()), eye=eye)
         rules = self.files.rules
         values = {name: values_of(rule, findings, LIGHT | RAYS) for name, rule in rules.items()}
-        verdicts = tuple(assess_room(rules, values, space, use))
+        verdicts = tuple(assess_room(rules, values, space, use, self.files.weather))
         return CheckedRoom(space, use, verdicts, None, None, None)
 
     def assumptions(self, rooms: list[CheckedRoom], left: list[Space]) -> list[str]:

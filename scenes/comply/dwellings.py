@@ -11,7 +11,7 @@ from bim.building_file import is_ifc
 from bim.model import Building, Space
 from bim.names import plain_text
 from mitsuba_cfs.notes import Note
-from scenes.comply.assess import NOT_COMPUTED, BuildingVerdict, RoomVerdict, assess_building
+from scenes.comply.assess import NO_VERDICT, NOT_COMPUTED, BuildingVerdict, RoomVerdict, assess_building
 from scenes.comply.results import CheckedRoom
 from scenes.comply.rules import NOT_MET
 from scenes.comply.uses import UNKNOWN, RoomUse, RoomUses
@@ -89,7 +89,7 @@ def asked_of_each(
         (number, dwelling)
         for rows, dwelling in zip(verdicts, dwellings, strict=True)
         for number, verdict in enumerate(rows)
-        if dwelling and verdict.applies and verdict.reached not in (NOT_MET, NOT_COMPUTED)
+        if dwelling and verdict.applies and verdict.reached not in (NOT_MET, NOT_COMPUTED, NO_VERDICT)
     }
 
     def asked(number: int, verdict: RoomVerdict, dwelling: str) -> bool:

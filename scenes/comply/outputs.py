@@ -21,7 +21,7 @@ from bim.sensors import view_point
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.files import write_table, write_text
 from scenes.comply import tables
-from scenes.comply.assess import NOT_COMPUTED, BuildingVerdict, RoomVerdict
+from scenes.comply.assess import NO_VERDICT, NOT_COMPUTED, BuildingVerdict, RoomVerdict
 from scenes.comply.findings import SeatGlare
 from scenes.comply.results import CheckedRoom, Compliance, GridSummary
 from scenes.comply.rules import NOT_MET, RuleTable
@@ -65,7 +65,7 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
         for one in room.verdicts
         if one.rule == verdict.rule and one.criterion.key == verdict.criterion.key and one.asked and one.applies
     ]
-    unknown = [room.space.label for room, one in asked if one.reached == NOT_COMPUTED]
+    unknown = [room.space.label for room, one in asked if one.reached in (NOT_COMPUTED, NO_VERDICT)]
     missed = [_short_of(room.space.label, one) for room, one in asked if one.reached == NOT_MET]
     met = len(asked) - len(unknown) - len(missed)
     parts = [f"{_capital(gettext(verdict.reached))}."]
@@ -92,6 +92,8 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
     of_glare = any("glare" in need.parts for level in verdict.criterion.level for need in level.needs)
     if unknown and not rule.fits(result.weather):
         parts.append(gettext("It asks for the weather of {sites}.", sites=rule.weather_asked))
+    elif unknown and not rule.judges(result.weather):
+        parts.append(gettext("It asks for weather whose header states {words}.", words=rule.header[0]))
     elif unknown and of_glare and all(room.light is None or room.light.glare is None for room, _ in asked):
         parts.append(gettext("Annual glare was not asked for."))
     rated = [room.light.glare for room, _ in asked if room.light is not None and room.light.glare is not None]

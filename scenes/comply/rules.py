@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator
 from importlib.resources import files
 from pathlib import Path
@@ -87,6 +88,8 @@ class RuleTable(TomlTable):
     left_out: tuple[str, ...] = ()  # parts that are not
     # conditions without which there is no verdict: a word of the weather's site or file name
     weather: tuple[str, ...] = ()
+    # and one of these words in what its header states of the source; without, figures but no verdict
+    header: tuple[str, ...] = ()
     setup: tuple[SetupTable, ...] = ()  # of rooms by use; a heat criterion of others has no verdict
     grid: GridTable
     criterion: Annotated[tuple[CriterionTable, ...], Field(min_length=1)]
@@ -106,8 +109,13 @@ class RuleTable(TomlTable):
         return next((one.operation for one in self.setup if use in one.uses), None)
 
     def fits(self, weather: Weather) -> bool:
-        """Whether the weather is one that the rule asks for."""
+        """Whether the weather is of a place, or name, that the rule asks for: heat is computed in it."""
         return not self.sites or _named(weather, self.sites)
+
+    def judges(self, weather: Weather) -> bool:
+        """Whether the rule gives a verdict with the weather: its header, too, states what the rule asks for."""
+        words = (re.search(rf"\b{re.escape(word)}(?![A-Za-z])", weather.source) for word in self.header)
+        return self.fits(weather) and (not self.header or any(words))
 
     @property
     def weather_asked(self) -> str:

@@ -250,7 +250,7 @@ def _rows(result: Compliance) -> Iterator[tuple[object, ...]]:
                         None if value is None else factor * value,
                         factor * (limit or 0.0),
                         need.unit,
-                        yes_or_no(need.met(value)),
+                        yes_or_no(need.met(value) if verdict.judged else None),
                         yes_or_no(verdict.asked),
                     )
 

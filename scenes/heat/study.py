@@ -47,6 +47,7 @@ from scenes.room.operation import (
     ground_note,
     stated_note,
     unstated_note,
+    weekday_note,
     with_stated_uses,
 )
 from scenes.room.operation_tables import PlantTable
@@ -622,5 +623,7 @@ def study_inputs(study: StudyFile, files: HeatFiles | None = None, progress: Pro
     rooms = "all" if study.couple or study.box is not None else "glazed"
     inputs = inputs_of(building, options, files.inputs, rooms=rooms, states=every_state, tables=study)
     notes = *stated_note(building, "the study"), *unstated_note(study, building, "the study")
-    inputs = replace(inputs, notes=(*notes, *ground_note(study, building), *unused_rules(study, inputs.filled)))
+    stated = () if inputs.operation is None else (inputs.operation.tables,)
+    notes += (*ground_note(study, building), *weekday_note((study, *stated), inputs.weather))
+    inputs = replace(inputs, notes=(*notes, *unused_rules(study, inputs.filled)))
     return replace(inputs, spaces=shared_constructions(inputs.spaces)) if study.couple else inputs

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
@@ -26,6 +26,7 @@ from scenes.fenestration.systems import FenestrationSystem, read_system, system_
 from scenes.fenestration.thermal_file import StateTable, read_reflectance
 from scenes.fenestration.thermal_system import checked_system
 from scenes.fenestration.tilts import tilt_states
+from scenes.language.catalogue import N_
 from scenes.room.luminaires import placed_spectrum
 from scenes.room.operation_tables import PARTS, GainsTable, GroundTable, OperationTables, RoomsTable, operated_tables
 from scenes.room.options import RoomOptions
@@ -572,6 +573,29 @@ def unstated_note(source: OperationTables | RoomOptions, building: Building, fil
     if not unstated:
         return ()
     return (Note("{values}, not stated in {file}.", values=", ".join(unstated), file=file),)
+
+
+WEEKDAYS = (N_("Monday"), N_("Tuesday"), N_("Wednesday"), N_("Thursday"), N_("Friday"), N_("Saturday"), N_("Sunday"))
+
+
+def weekday_note(tables: Iterable[OperationTables], weather: Weather) -> tuple[str, ...]:
+    """A sentence on the weekday of 1 January, where schedules by weekday take it from the weather; else empty."""
+    variants = (one for table in tables for one in table.variants if one.calendar.starts_on is None)
+    if not any(schedule.by_weekday for one in variants for schedule in one.schedules.values()):
+        return ()
+    first = weather.midpoints[0]
+    if weather.first_weekday is not None:
+        note = Note(
+            "Schedules by weekday: 1 January is a {day}, by the weather file's header.",
+            day=Note(WEEKDAYS[weather.first_weekday]),
+        )
+        return (note,)
+    note = Note(
+        "Schedules by weekday: 1 January is a {day}, as in {year}, because the weather file's header states none.",
+        day=Note(WEEKDAYS[first.replace(month=1, day=1).day_of_week]),
+        year=str(first.year),
+    )
+    return (note,)
 
 
 def ground_note(tables: OperationTables, building: Building) -> tuple[str, ...]:

@@ -135,6 +135,14 @@ class ScheduleTable(DaysTable):
         values = [one.value for profile in profiles if profile is not None for one in profile]
         return tuple(self.peak * value for value in (self.otherwise, *values))
 
+    @property
+    def by_weekday(self) -> bool:
+        """Whether values depend on the day of the week."""
+        if self._year is not None:
+            return bool(np.ptp(self._year.values[:, : len(WEEK)], axis=1).any())
+        parts = (self, *self.season)
+        return any(day is not None for part in parts for day in (part.weekend, part.saturday, part.sunday))
+
     def hourly(self, weather: Weather, holidays: tuple[str, ...]) -> FloatArray:
         """The values [H]; `holidays`: MM-DD, for a schedule without its own."""
         if self.csv is not None:

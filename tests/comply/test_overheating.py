@@ -10,7 +10,7 @@ import pytest
 
 from bim.shoebox import shoebox
 from mitsuba_cfs.sky.epw import read_epw
-from scenes.comply.assess import NOT_COMPUTED, assess_room, values_of
+from scenes.comply.assess import NO_VERDICT, NOT_COMPUTED, NOT_FOR_IT, assess_building, assess_room, values_of
 from scenes.comply.findings import Findings, RoomHeat, calendar_of
 from scenes.comply.needs import LimitTable
 from scenes.comply.rules import NOT_MET, read_rule, rule_names
@@ -233,6 +233,29 @@ def test_regions_of_din_4108_2(calendar, site, region):
     times = calendar.times.repeat(2)
     shorter = Findings(replace(calendar, step_h=0.5, times=times), heat=half)
     assert need.value(shorter) == pytest.approx(1200.0)
+
+
+@pytest.mark.parametrize(
+    ("source", "level"),
+    [
+        ("DWD TRY2011_12_Jahr", "met"),
+        ("Deutscher Wetterdienst, Testreferenzjahr 2011", "met"),
+        ("IWEC Data; IWEC- WMO#107290, country", NO_VERDICT),
+        ("TRYOUT", NO_VERDICT),
+        ("", NO_VERDICT),
+    ],
+)
+def test_din_4108_2_gives_a_verdict_with_a_test_reference_year_alone(calendar, source, level):
+    """Figures of the same year either way; the building has no verdict where a room has none."""
+    weather = replace(read_epw(WEATHER), site="Mannheim, DEU", source=source)
+    rules = {"din4108-2": read_rule("din4108-2").of_weather(weather)}
+    values = {name: values_of(rule, year(calendar, 20.0), rule.parts) for name, rule in rules.items()}
+    rows = tuple(assess_room(rules, values, shoebox().spaces[0], RoomUse("bedroom", True, ""), weather))
+    (verdict,) = (one for one in rows if one.applies)
+    assert verdict.reached == level and verdict.values == ((0.0,),)
+    assert rules["din4108-2"].fits(weather)  # its heat is computed
+    whole = {one.criterion.key: one.reached for one in assess_building([rows], [20.0])}
+    assert whole == {"dwellings_c": level, "others_c": NOT_FOR_IT}
 
 
 def test_table_of_a_rule_without_verdict_has_its_quantities_and_limits(calendar):

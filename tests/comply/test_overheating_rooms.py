@@ -43,7 +43,7 @@ def rooms(facing, window):
 def levels(side, warmer):
     """The levels reached by rule and criterion, in Chicago's weather that much warmer [K]."""
     weather = read_epw(WEATHER)
-    weather = replace(weather, site=SITE, dry_bulb_c=weather.dry_bulb_c + warmer)
+    weather = replace(weather, site=SITE, source="DWD TRY", dry_bulb_c=weather.dry_bulb_c + warmer)
     rules = {name: read_rule(name).of_weather(weather) for name in PROOFS}
     options = ComplyOptions(None, WEATHER, standards=PROOFS, room=FEW)
     inputs = InputFiles(weather, WindowOverrides((read_system(GLAZING),)), None)

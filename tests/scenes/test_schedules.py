@@ -16,7 +16,9 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
-from scenes.room.operation import OperationHours, check_schedules, read_operation
+from scenes.heat.study import study_inputs
+from scenes.heat.study_file import StudyFile
+from scenes.room.operation import OperationHours, check_schedules, read_operation, weekday_note
 from scenes.room.operation_tables import OperationTables
 from scenes.run.files import read_files
 from scenes.run.options import JobOptions
@@ -46,6 +48,36 @@ def test_a_week_begins_on_the_weather_files_own_day(weather) -> None:
     assert friday[8] == 1.0 and friday[24:72].tolist() == [0.25] * 48
     stated = hours_of({"weekday": WORK, "weekend": 0.25}, weather, calendar={"starts_on": "friday"})
     np.testing.assert_array_equal(stated, friday)
+
+
+def test_the_weekday_of_the_first_day_is_named_where_schedules_depend_on_it(weather) -> None:
+    """Chicago's header says Sunday; without one it is that of the year, 2017 for a typical one."""
+
+    def said(schedule: dict, weather: Weather, **more) -> list[str]:
+        tables = OperationTables.model_validate({"schedules": {"x": schedule}} | more)
+        return [str(note) for note in weekday_note([tables], weather)]
+
+    week = {"weekday": WORK, "weekend": 0.25}
+    (stated,) = said(week, weather)
+    assert stated == "Schedules by weekday: 1 January is a Sunday, by the weather file's header."
+    (tuesday,) = said(week, replace(weather, first_weekday=1))
+    assert "1 January is a Tuesday" in tuesday
+    silent = replace(weather, first_weekday=None)
+    (assumed,) = said(
+        {"weekday": WORK, "season": [{"dates": ["06-01", "08-31"], "weekday": 0.0, "sunday": 1.0}]}, silent
+    )
+    year = weather.midpoints[0].year
+    assert assumed.endswith(f"as in {year}, because the weather file's header states none.")
+    assert silent.weekday[0] == weather.midpoints[0].day_of_week
+    # the same every day, or the first day in the calendar of the file itself: nothing is taken from the weather
+    assert said({"weekday": WORK}, silent) == said(week, silent, calendar={"starts_on": "friday"}) == []
+    assert said({"weekday": WORK, "holiday": 0.0}, silent) == []
+
+
+def test_the_inputs_of_a_study_name_the_weekday(weather) -> None:
+    table = {"weather": str(WEATHER), "box": {"width": 4.0, "depth": 5.0, "height": 3.0}}
+    study = StudyFile.model_validate(table | {"schedules": {"x": {"weekday": WORK, "weekend": 0.25}}})
+    assert any("1 January is a Sunday" in str(note) for note in study_inputs(study).notes)
 
 
 def test_days_go_before_their_likes_and_24_values_are_hours(weather) -> None:
