@@ -115,6 +115,26 @@ def test_python_examples_run(page, folder, variant):
         exec(compile(code, f"{page.name}, example {number}", "exec"), names)
 
 
+def test_a_tool_starts_a_job_and_reads_it_as_the_docs_say(folder, monkeypatch):
+    import os
+    import sys
+
+    page = (REPOSITORY / "docs" / "formats.md").read_text("utf-8").partition("### For tools that start")[2]
+    page = page.partition("### Results in xarray")[0]
+    (code,) = [code for kind, code in FENCE.findall(page) if kind == "py"]
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    names: dict = {}
+    exec(compile(code, "formats.md", "exec"), names)
+    assert names["progress"] and names["checked"]["rooms"]
+    for keys in (*names["progress"], names["checked"]):
+        assert {key for key in keys if f"`{key}`" not in page} == set()
+    for row, entry in (("rooms", "guid label use floor_m2 windows"), ("issues", "code severity where what")):
+        assert set(entry.split()) <= set(names["checked"][row][0])
+    Path("model.hbjson").write_text("{")
+    with pytest.raises(SystemExit, match=r"^error: model.hbjson"):
+        exec(compile(code, "formats.md", "exec"), names)
+
+
 def test_study_files_in_the_docs_are_read(folder):
     from scenes.study.study_file import read_study
 

@@ -49,7 +49,8 @@ NAME = re.compile(r"[^\w .()+-]")
 WRITTEN = "# written by cfs app\n"
 OPERATED = "controlled "  # beginning of the file names of systems that the page makes
 EXPORTED = 200  # files for other programs that the page lists
-LOADS = {"heating_c": 20.0, "cooling_c": 26.0}
+OWN_LOADS = (".hbjson", ".gbxml", ".xml")  # buildings whose file has set points of its own
+LOADS = {"heating_c": 20.0, "cooling_c": 26.0}  # of a new project
 GAINS = ("equipment_w_m2", "lighting_w_m2", "lighting_target_lx")
 
 
@@ -228,10 +229,16 @@ class Project:
 
     def _join(self, file: ProjectFile) -> None:
         """Use a new file in the study; several IFC files are one building."""
-        study = self.study() or {"quick": True}  # a new project's first answer comes soon
+        study = self.study()
+        if not study:
+            study["quick"] = True  # a new project's first answer comes soon
+            if not (self.folder / OPERATION).exists():
+                self._change_loads(study, LOADS)
         if file.kind == "building":
             files = self._building(study)
             if file.path not in files:
+                if file.path.lower().endswith(OWN_LOADS) and self.operation() == {"loads": LOADS}:
+                    self._change_loads(study, {})
                 ifc = (".ifc", ".ifczip")
                 both = all(path.lower().endswith(ifc) for path in (*files, file.path))
                 self._set_building(study, [*files, file.path] if both else [file.path])

@@ -328,6 +328,7 @@ class StatedValues:
     shade: bool = False  # there is one, of which no BSDF is known
     glass: PlainGlass | None = None  # a single pane, whose law of the angle is known
     generic: str = ""  # name of the generic glazing that values come from
+    unstated: bool = False  # all of them, as the file states none
 
     def missing(self, light_only: bool) -> str:
         """What is needed and not stated, in words; empty where nothing is missing."""
@@ -405,6 +406,7 @@ def _completed(values: StatedValues, overrides: WindowOverrides, path: Path) -> 
         u_value=_first(values.u_value, generic.u_value),
         panes=values.panes or generic.panes,
         generic=name,
+        unstated=unknown,
     )
 
 
@@ -473,10 +475,20 @@ def glazing_system(values: StatedValues, file: str, digits: int = 3) -> Fenestra
         g_value=g,
         shading_position="none",
         notes=tuple(notes),
-        source=Note("the values stated in {file}", file=file),
+        source=_values_source(values, file),
         angular=table,
         from_values=True,
     )
+
+
+def _values_source(values: StatedValues, file: str) -> Note:
+    """Where the values of a glazing are from."""
+    if values.unstated:
+        return Note("the values of {generic}, as {file} states none", generic=values.generic, file=file)
+    if values.generic:
+        template = N_("the values given or stated in {file} and, where there are none, those of {generic}")
+        return Note(template, file=file, generic=values.generic)
+    return Note("the values stated in {file}", file=file)
 
 
 def _in_words(values: StatedValues, digits: int) -> Note:

@@ -134,6 +134,11 @@ def test_the_commands_are_shown_before_they_run(browser, served) -> None:
     assert run.startswith("cfs run inputs/office.ifc --weather ") and "--operation" in run
     assert "--quick" in run and "--out results/report-" in run
     assert comply.startswith("cfs comply ") and "--standard en17037" in comply
+    asked = "document.getElementById('conditioned').value"
+    assert browser.value(asked) == "heated" and browser.value("document.getElementById('heating_c').value") == "20"
+    select(browser, "conditioned", "free")
+    browser.until("document.getElementById('set-points').hidden")
+    assert served.project.operation() == {}
     select(browser, "conditioned", "heated")
     browser.until("document.getElementById('heating_c').value === '20'")
     assert served.project.operation()["loads"] == {"heating_c": 20.0, "cooling_c": 26.0}

@@ -24,8 +24,10 @@ from scenes.result_folder import ResultFolder
 from scenes.room.operation import read_operation
 from scenes.study.files import check_files
 from scenes.study.study_file import read_study
+from tests.conftest import REPOSITORY
 
 GLAZING = VENETIAN_BLIND.with_name("glazing.xml")
+TWO_ROOMS = REPOSITORY / "docs" / "tutorials" / "two_rooms.hbjson"
 
 
 def take(project: Project, file: Path) -> str:
@@ -158,9 +160,9 @@ def test_tables_of_the_user_and_further_climates_stay(project) -> None:
     study["system"].append({"name": "away", "operation": "../controlled away.toml"})
     study["climate"].append({"name": "second", "weather": "second.epw"})
     project.write_study(study)
-    project.change({"loads": {"heating_c": 20}})
-    assert "open_above_c = 24" in moving.read_text() and "heating_c" in moving.read_text()
-    assert "heating_c" not in away.read_text()
+    project.change({"loads": {"heating_c": 18}})
+    assert "open_above_c = 24" in moving.read_text() and "heating_c = 18" in moving.read_text()
+    assert "heating_c = 18" not in away.read_text()
     take(project, WEATHER)
     assert [one["name"] for one in project.study()["climate"]][1:] == ["second"]
 
@@ -182,6 +184,25 @@ def test_set_points_and_gains_are_an_operation_file(project) -> None:
     assert not (project.folder / "operation.toml").exists()
     assert "operation" not in project.study()
     assert read_operation(moving).systems
+
+
+def test_rooms_of_a_new_project_are_heated_and_cooled_until_the_user_says_otherwise(project, tmp_path) -> None:
+    assert project.operation() == {"loads": {"heating_c": 20.0, "cooling_c": 26.0}}
+    for computed in actions.computations(project, {"report": True}):
+        assert computed.command[computed.command.index("--operation") + 1] == "operation.toml"
+    project.change({"loads": {}})
+    take(project, WEATHER)
+    take(project, OFFICE)
+    assert project.operation() == {}
+    assert "--operation" not in actions.computations(project, {"report": True})[0].command
+    own = Project(tmp_path / "own")  # HBJSON has set points of its own, gbXML too
+    for file in (WEATHER, TWO_ROOMS):
+        take(own, file)
+    assert own.operation() == {}
+    kept = Project(tmp_path / "kept")
+    (kept.folder / "operation.toml").write_text("[loads]\nheating_c = 18\n")
+    take(kept, OFFICE)
+    assert kept.operation() == {"loads": {"heating_c": 18}}
 
 
 def test_uses_and_corrections_are_files_of_the_command_line(project) -> None:

@@ -440,6 +440,15 @@ def test_a_generic_glazing_fills_windows_whose_file_states_nothing(tmp_path, nam
     heat = checked_system(system, path)  # U, g and transmittance go together
     assert float(heat.g_value[0]) == pytest.approx(generic.g_value, abs=1e-6)
     assert any(name in str(note) for note in system.notes)
+    assert system.source == f"the values of {name}, as room.ifc states none"
+
+
+def test_a_file_that_states_one_value_and_the_reference_glazing_are_both_named(tmp_path) -> None:
+    path = room(tmp_path / "room.ifc", {GLAZING: {"VisibleLightTransmittance": 0.7}})
+    overrides = WindowOverrides(glazing="double low-e")
+    (system,) = next(iter(fill_windows(read_ifc(path).windows, overrides, path).values()))
+    assert normal_transmittance(system.visible) == pytest.approx(0.7, abs=2e-3) and system.u_value == 1.2
+    assert system.source == "the values given or stated in room.ifc and, where there are none, those of double low-e"
 
 
 def test_a_visible_transmittance_of_the_user_fills_windows_of_a_light_only_command(tmp_path) -> None:
@@ -464,6 +473,7 @@ def test_an_hbjson_without_glazing_has_the_default_pane_of_honeybee(tmp_path) ->
     }.values()
     assert normal_transmittance(system.visible) == pytest.approx(0.64, abs=2e-3)
     assert any("honeybee's default pane" in str(note) for note in system.notes)
+    assert system.source.startswith("the values of honeybee's default pane, as ")
 
 
 def test_the_generic_glazings_are_the_reference_glazings_of_en_14501() -> None:

@@ -14,9 +14,11 @@ import pytest
 
 from scenes.cli import run
 from scenes.quick import NOTE
+from tests.conftest import REPOSITORY
 
 pytestmark = pytest.mark.early
 
+FORMATS = REPOSITORY / "docs" / "formats.md"
 DEMO = Path(str(files("scenes") / "demo"))
 OFFICE = DEMO / "office.ifc"
 WEATHER = DEMO / "USA_IL_Chicago-OHare.Intl.AP.725300_TMY3.epw"
@@ -62,6 +64,8 @@ def test_files_of_a_run(results):
     assert len(temperatures) == 8760 and not temperatures.isna().any().any()
     manifest = json.loads((results / "run.json").read_text())
     assert manifest["inputs"]["weather"]["sha256"] and manifest["seed"] == 0
+    (row,) = [one for one in FORMATS.read_text("utf-8").splitlines() if one.startswith("| `run.json` of `cfs run`")]
+    assert [key for key in manifest if f"`{key}`" not in row] == [], "docs/formats.md lists the keys for other programs"
     assert not list(results.parent.glob(".*")), "temporary folders are gone"
 
 
