@@ -76,6 +76,7 @@ WIDEST_GAP_NM = 50.0  # between visible data of a pane, which files have every 5
 REFLECTANCE_COLUMNS = ("wavelength_nm", "reflectance")
 SLAT_STEP = 10  # nanometres between the reflectances in a file of coloured slats
 SLAT_NAMES = ("wavelength_nm", "reflectance", "shares")  # of that file
+LARGEST_SHARE = 100.0  # in amount: shares are coefficients of a polynomial, of which only the sum is a share
 SPECTRUM_OPTIONAL = ("reflectance",)  # of the side of a shade that faces the panes
 Film = Annotated[Positive, plausible.RESISTANCE]  # [m2 K/W]
 PATCHES = KLEMS_FULL.size
@@ -518,9 +519,10 @@ def read_slat_light(path: Path) -> SlatLight:
         raise DataError(f"expected {size} x {size} patches for each number of reflections", file=path, field="shares")
     if nm.shape != rho.shape or not np.array_equal(nm, NANOMETRES[::SLAT_STEP]):
         raise DataError(f"expected a reflectance every {SLAT_STEP} nm from 380 to 780", file=path, field="reflectance")
-    for name, values in (("reflectance", rho), ("shares", shares)):
-        if not ((values >= 0) & (values <= 1)).all():
-            raise DataError("expected numbers from 0 to 1", file=path, field=name)
+    if not ((rho >= 0) & (rho <= 1)).all():
+        raise DataError("expected numbers from 0 to 1", file=path, field="reflectance")
+    if not (np.abs(shares) <= LARGEST_SHARE).all():
+        raise DataError(f"expected numbers from -{LARGEST_SHARE:g} to {LARGEST_SHARE:g}", file=path, field="shares")
     return SlatLight(np.interp(NANOMETRES, nm, rho), shares)
 
 

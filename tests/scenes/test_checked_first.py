@@ -91,22 +91,25 @@ class Place:
         return "operation.toml"
 
 
+def _but(usual: dict[str, object], words: tuple[object, ...]) -> list:
+    """The usual options, but for those among the words, and the words."""
+    return [part for option in usual.items() if option[0] not in words for part in option] + [*words]
+
+
 def _run(*words: object, building="house.ifc", weather=WEATHER, cfs=VENETIAN_BLIND) -> list:
-    return ["run", building, "--weather", weather, "--cfs", cfs, "--out", "out", *words]
+    return ["run", building, *_but({"--weather": weather, "--cfs": cfs, "--out": "out"}, words)]
 
 
 def _dgp(*words: object, building: object = "house.ifc") -> list:
-    return ["dgp", building, "--weather", WEATHER, "--out", "out", *words]
+    return ["dgp", building, *_but({"--weather": WEATHER, "--out": "out"}, words)]
 
 
 def _comply(*words: object, building: object = "house.ifc") -> list:
-    more = ["--weather", WEATHER, "--standard", "en17037", "--out", "out"]
-    return ["comply", building, *more, *words]
+    return ["comply", building, "--standard", "en17037", *_but({"--weather": WEATHER, "--out": "out"}, words)]
 
 
 def _picture(*words: object, building: object = "house.ifc", at: str = "06-21 12:00") -> list:
-    more = ["--weather", WEATHER, "--at", at, "--out", "a.hdr"]
-    return ["picture", building, *more, *words]
+    return ["picture", building, *_but({"--weather": WEATHER, "--at": at, "--out": "a.hdr"}, words)]
 
 
 def _box_study(place: Place) -> str:
@@ -115,8 +118,8 @@ def _box_study(place: Place) -> str:
     return "box.toml"
 
 
-def _pv(weather: object = WEATHER, building: object = "house.ifc", study: str = "pv.toml") -> list:
-    return ["pv", building, "--weather", weather, "--study", study, "--out", "out"]
+def _pv(weather: object = WEATHER, building: object = "house.ifc", study: str = "pv.toml", out: object = "out") -> list:
+    return ["pv", building, "--weather", weather, "--study", study, "--out", out]
 
 
 def _pv_file(place: Place, text: str) -> list:
@@ -206,7 +209,7 @@ MISTAKES: dict[str, tuple[Callable[[Place], list], str]] = {
         "pv.toml: module.cell: no such key; did you mean cells? (and 1 more)",
     ),
     "pv, datasheet": (lambda p: _pv_file(p, f"[module]{MODULE}cells = 6"), "pv.toml: module: no two-diode cell"),
-    "pv, folder": (lambda p: [*_pv(), "--out", p.folder], "--out: "),
+    "pv, folder": (lambda p: _pv(out=p.folder), "--out: "),
     "dgp, head": (lambda p: _dgp(building="word.ifc"), "word.ifc: not an IFC file"),
     "dgp, weather": (lambda p: _dgp("--weather", "short.epw"), SHORT),
     "dgp, BSDF": (lambda p: _dgp("--cfs", "bad.xml"), "bad.xml: is not well-formed"),

@@ -123,7 +123,7 @@ def test_operation_through_the_command(tmp_path, blind, capsys) -> None:
         f'[control]\nrule = "schedule"\nschedule = [{closed}]\n'
         "[loads]\nheating_c = 20\ncooling_c = 26\n[gains]\nlighting_w_m2 = 8\n"
     )
-    assert job(with_data, tmp_path / "out", "--operation", operation, "--method", "three-phase") == 0
+    assert job(with_data, tmp_path / "out", "--operation", operation) == 0
     hours = pd.read_csv(tmp_path / "out" / "operation.csv", index_col="time", parse_dates=True)
     assert hours["shading_state"].groupby(hours.index.hour).first().tolist() == [
         int(10 <= hour < 16) for hour in range(24)
