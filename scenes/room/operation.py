@@ -600,14 +600,16 @@ def weekday_note(tables: Iterable[OperationTables], weather: Weather) -> tuple[s
 
 def ground_note(tables: OperationTables, building: Building) -> tuple[str, ...]:
     """Sentences on the ground that is assumed, and on what the ground around a basement lacks."""
-    grounds = [one.envelope.ground for one in tables.variants]
-    return (*assumed_ground_note(building, grounds), *_basement_note(grounds))
+    envelopes = [one.envelope for one in tables.variants]
+    grounds = [one.ground for one in envelopes]
+    stated = [one.ground is not None or any("floor" in n.faces for n in one.neighbour) for one in envelopes]
+    return (*(() if all(stated) else assumed_ground_note(building)), *_basement_note(grounds))
 
 
-def assumed_ground_note(building: Building, grounds: Sequence[GroundTable | None] = (None,)) -> tuple[str, ...]:
+def assumed_ground_note(building: Building) -> tuple[str, ...]:
     """A sentence on the ground below floors of which no `[envelope.ground]` is stated; empty without such floors."""
     area, perimeter = ground_floor(building)
-    if None not in grounds or min(area, perimeter) <= 0:
+    if min(area, perimeter) <= 0:
         return ()
     note = Note(
         "Floors on the ground without [envelope.ground] are computed by ISO 13370 with {area:.0f} m2 and "

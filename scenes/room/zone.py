@@ -82,14 +82,21 @@ def enveloped(
                 replace(surface, layers=(layer,)) if own[0].kind == "window frame" else surface
                 for surface, own in zip(surfaces, faces, strict=True)
             ]
+        hours = OperationHours(tables, weather)
+        places = [f"envelope.neighbour.{number}" for number in range(len(envelope.neighbour))]
+        behind = [
+            list(_named(table, faces, building, place)) for table, place in zip(envelope.neighbour, places, strict=True)
+        ]
         ground = envelope.ground or default_ground(building, space, weather)
         if ground is not None:
+            own = surfaces
             surfaces = _grounded(surfaces, ground, weather, every=envelope.ground is not None)
-        hours = OperationHours(tables, weather)
-        for number, table in enumerate(envelope.neighbour):
-            place = f"envelope.neighbour.{number}"
+            if envelope.ground is None:  # a stated neighbour goes before what is assumed
+                for i in {i for named in behind for i in named}:
+                    surfaces[i] = own[i]
+        for table, place, named in zip(envelope.neighbour, places, behind, strict=True):
             beyond = hours.value(table, "temperature_c", place)
-            for i in _named(table, faces, building, place):
+            for i in named:
                 surfaces[i] = _next_to(surfaces[i], table, beyond)
     except ThermalInputError as error:
         raise DataError(error.message, file=building.file, element=space.label, field="envelope") from None

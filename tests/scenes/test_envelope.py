@@ -16,7 +16,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
 from scenes.demo import WEATHER
-from scenes.room.operation import OperationHours, check_schedules
+from scenes.room.operation import OperationHours, check_schedules, ground_note
 from scenes.room.operation_tables import OperationTables
 from scenes.room.zone import default_ground, enveloped, glass_edge
 from scenes.toml_file import validated
@@ -137,6 +137,19 @@ def test_an_interior_room_and_some_days_of_weather_keep_undisturbed_soil(weather
     assert default_ground(box, box.spaces[0], weather).perimeter == pytest.approx(4.0)
     days = SimpleNamespace(times=weather.times[:48], step_h=1.0)
     assert default_ground(box, box.spaces[0], days) is None
+
+
+def test_a_neighbour_that_is_stated_below_a_floor_goes_before_the_assumed_ground(weather) -> None:
+    """As in ASHRAE 140: 10 degC at the floor's outer face, without soil before it."""
+    windows = (WindowRectangle(0.5, 1.0, 3.0, 1.5),)
+    box = shoebox(4.0, 5.0, 3.0, windows=windows, adjacency={"floor": "ground"})
+    text = '[[envelope.neighbour]]\nfaces = ["floor"]\ntemperature_c = 10.0\nfilm = 0.0\n'
+    floor = surface(room_of(text, weather, box).zone, DOWN)
+    own = surface(thermal_room(box.spaces[0], Fenestration("glass", 1.1)).zone, DOWN)
+    assert sum(layer.resistance for layer in floor.layers) == pytest.approx(sum(one.resistance for one in own.layers))
+    assert set(np.unique(floor.beyond_c)) == {10.0}
+    tables = validated(OperationTables, tomllib.loads(text), WEATHER)
+    assert not ground_note(tables, box) and ground_note(OperationTables(), box)
 
 
 def test_neighbours_bridges_and_frames(weather) -> None:
