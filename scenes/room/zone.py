@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -84,16 +84,13 @@ def enveloped(
             ]
         hours = OperationHours(tables, weather)
         places = [f"envelope.neighbour.{number}" for number in range(len(envelope.neighbour))]
-        behind = [
-            list(_named(table, faces, building, place)) for table, place in zip(envelope.neighbour, places, strict=True)
-        ]
-        ground = envelope.ground or default_ground(building, space, weather)
-        if ground is not None:
-            own = surfaces
-            surfaces = _grounded(surfaces, ground, weather, every=envelope.ground is not None)
-            if envelope.ground is None:  # a stated neighbour goes before what is assumed
-                for i in {i for named in behind for i in named}:
-                    surfaces[i] = own[i]
+        behind = [_named(table, faces, building, at) for table, at in zip(envelope.neighbour, places, strict=True)]
+        if envelope.ground is not None:
+            surfaces = _grounded(surfaces, envelope.ground, weather)
+        elif (ground := default_ground(building, space, weather)) is not None:
+            stated = {i for named in behind for i in named}  # goes before what is assumed
+            kept = {i for i, one in enumerate(surfaces) if i in stated or not _in_ground(one, ground)}
+            surfaces = _grounded(surfaces, ground, weather, kept)
         for table, place, named in zip(envelope.neighbour, places, behind, strict=True):
             beyond = hours.value(table, "temperature_c", place)
             for i in named:
@@ -124,21 +121,27 @@ def default_ground(building: Building, space: Space, weather: Weather) -> Ground
     A room with walls in the ground is a basement as deep as these.  None: undisturbed soil at the outer face, for
     weather of less than a year, and for a building without floors on the ground or outer walls above them.
     """
+    on_ground = any(face.adjacency == "ground" for face in space.faces)
+    if not on_ground or len(weather.times) * weather.step_h < 24.0 * YEAR_DAYS:
+        return None
     area, perimeter = ground_floor(building)
-    if min(area, perimeter) <= 0 or len(weather.times) * weather.step_h < 24.0 * YEAR_DAYS:
+    if min(area, perimeter) <= 0:
         return None
     depth = buried_depth(space)
     kind = {"kind": "basement", "depth": depth} if depth > LEAST_DEPTH else {"kind": "slab"}
     return GroundTable.model_construct(area=area, perimeter=perimeter, **kind)
 
 
-def _grounded(
-    surfaces: Sequence[OpaqueSurface], table: GroundTable, weather: Weather, *, every: bool
-) -> list[OpaqueSurface]:
-    """The surfaces, those on the ground with soil and virtual layer (ISO 13370).
+def _in_ground(surface: OpaqueSurface, table: GroundTable) -> bool:
+    """Whether ISO 13370 has the surface: a floor, or a wall of a basement."""
+    downwards = surface.normal[2]
+    return downwards < DOWNWARDS or (table.kind == "basement" and abs(downwards) < -DOWNWARDS)
 
-    Args: every: refuse a surface that the table does not describe; else it keeps undisturbed soil.
-    """
+
+def _grounded(
+    surfaces: Sequence[OpaqueSurface], table: GroundTable, weather: Weather, kept: Collection[int] = ()
+) -> list[OpaqueSurface]:
+    """The surfaces, those on the ground with soil and virtual layer (ISO 13370), but for those that are kept."""
     days = weather.midpoints
     hours = (days.day_of_year.to_numpy() - 1) * 24.0 + days.hour.to_numpy() + days.minute / 60.0
     year = harmonic(weather.dry_bulb_c, hours)
@@ -146,9 +149,8 @@ def _grounded(
     floors = [s for s in surfaces if s.outside == "ground" and s.normal[2] < DOWNWARDS]
     area = table.area or sum(s.area for s in floors)
     grounded = []
-    for surface in surfaces:
-        described = surface.normal[2] < DOWNWARDS or (table.kind == "basement" and abs(surface.normal[2]) < -DOWNWARDS)
-        if surface.outside != "ground" or not (every or described):
+    for number, surface in enumerate(surfaces):
+        if surface.outside != "ground" or number in kept:
             grounded.append(surface)
             continue
         element = _element(surface, floors, table, area, wind)
