@@ -79,6 +79,11 @@ def model_frame(name: str) -> Model:
     }
 
 
+def layer_keys(count: int) -> tuple[str, ...]:
+    """Fields of a construction's layers, outside to inside."""
+    return ("outside_layer", *(f"layer_{k}" for k in range(2, count + 1)))
+
+
 def opaque_construction(model: Model, layers: list[Layer], outside: FaceFinish, inside: FaceFinish, name: str) -> str:
     """Name of the construction of some layers, outermost first, each face with its own finish.
 
@@ -96,8 +101,7 @@ def opaque_construction(model: Model, layers: list[Layer], outside: FaceFinish, 
     buried = FaceFinish(0.5)
     finishes = [outside, *[buried] * (len(layers) - 2), inside]
     names = [_material(model, *pair) for pair in zip(layers, finishes, strict=True)]
-    keys = ["outside_layer", *(f"layer_{k}" for k in range(2, len(names) + 1))]
-    entry = dict(zip(keys, names, strict=True))
+    entry = dict(zip(layer_keys(len(names)), names, strict=True))
     for known, other in model["Construction"].items():
         if other == entry:
             return known

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.energyplus_parts import Model
+from bim.energyplus_parts import Model, layer_keys
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
 from thermal.blackbox import R_INNER, R_OUTER, Fenestration, LayerAbsorptances
 from thermal.glazing_unit import GasGap, GlazingUnit
@@ -82,8 +82,8 @@ def complex_state(model: Model, name: str, optics: WindowOptics, *, panes: bool)
     sun = optics.absorptances.two_layers(optics.fenestration)
     absorbed = [(sun.outer, np.zeros(size)), *still, (sun.inner, np.full(size, optics.back_absorptance))]
     layers: dict[str, str] = {f"gap_{k}_name": gap for k, gap in enumerate(gaps, 1)}
-    for k, (pair, pane) in enumerate(zip(absorbed, stack, strict=True), 1):
-        key = "outside_layer" if k == 1 else f"layer_{k}"
+    keys = layer_keys(len(stack))
+    for k, (key, pair, pane) in enumerate(zip(keys, absorbed, stack, strict=True), 1):
         layers[f"{key}_name"] = pane
         for side, values in zip(("front", "back"), pair, strict=True):
             layers[f"{key}_directional_{side}_absorptance_matrix_name"] = _matrix(

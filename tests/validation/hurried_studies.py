@@ -21,6 +21,7 @@ import numpy as np
 import pandas as pd
 
 from bim.defaults import CEILING_SLAB, EXTERIOR_WALL, GROUND_FLOOR, INTERIOR_WALL, ROOF, ROOM_REFLECTANCE, UPPER_FLOOR
+from bim.energyplus_parts import layer_keys
 from bim.model import Construction
 from tests.validation.differences import rmse_and_bias
 from tests.validation.energyplus_by_study import known_window, our_year
@@ -227,7 +228,7 @@ class Box:
             }
             for k, one in enumerate(layers)
         }
-        keys = ["outside_layer", *(f"layer_{k}" for k in range(2, len(layers) + 1))]
+        keys = layer_keys(len(layers))
         free, upright = beyond == OUTDOORS, side in ends
         face: dict[str, Any] = {
             "surface_type": "Wall" if upright else side.capitalize(),

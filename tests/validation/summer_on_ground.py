@@ -19,7 +19,9 @@ import numpy as np
 import pandas as pd
 
 from bim.building_file import read_building_file
+from bim.energyplus_parts import MOST_LAYERS, layer_keys
 from bim.ground_floor import ground_floor
+from bim.planes import newell_normal
 from scenes.cli import run
 from tests.conftest import REPOSITORY
 from tests.validation.energyplus_program import run_written
@@ -62,7 +64,6 @@ least_outdoor_c = -20
 [loads]
 heating_c = 20
 """
-LAYERS = ("outside_layer", *(f"layer_{i}" for i in range(2, 11)))
 SOIL_LAYERS = 2  # that ISO 13370 puts before a construction: virtual layer and soil
 
 
@@ -113,28 +114,23 @@ def in_kiva(model: Model, absorptance: float) -> Model:
         if "beyond" not in surface.get("outside_boundary_condition_object", ""):
             continue
         construction = model["Construction"][surface["construction_name"]]
-        layers = [construction[key] for key in LAYERS if key in construction][SOIL_LAYERS:]
-        model["Construction"][f"{name} alone"] = dict(zip(LAYERS, layers, strict=False))
+        layers = [construction[key] for key in layer_keys(MOST_LAYERS) if key in construction][SOIL_LAYERS:]
+        model["Construction"][f"{name} alone"] = dict(zip(layer_keys(len(layers)), layers, strict=True))
         surface |= {
             "construction_name": f"{name} alone",
             "outside_boundary_condition": "Foundation",
             "outside_boundary_condition_object": f"{name} ground",
         }
+        corners = np.array([[one[f"vertex_{axis}_coordinate"] for axis in "xyz"] for one in surface["vertices"]])
+        area_here = float(np.linalg.norm(newell_normal(corners)))
         kiva = {"wall_height_above_grade": 0.2, "wall_depth_below_slab": 0.0}
         model.setdefault("Foundation:Kiva", {})[f"{name} ground"] = kiva
         model.setdefault("SurfaceProperty:ExposedFoundationPerimeter", {})[f"{name} edge"] = {
             "surface_name": name,
             "exposed_perimeter_calculation_method": "TotalExposedPerimeter",
-            "total_exposed_perimeter": plane_area(surface) * perimeter / area,
+            "total_exposed_perimeter": area_here * perimeter / area,
         }
     return model
-
-
-def plane_area(surface: Model) -> float:
-    """Area [m2] of a surface."""
-    points = np.array([[one[f"vertex_{axis}_coordinate"] for axis in "xyz"] for one in surface["vertices"]])
-    edges = points[1:] - points[0]
-    return float(np.linalg.norm(np.cross(edges[:-1], edges[1:]).sum(axis=0)) / 2.0)
 
 
 def row(source: str, room: str, operative: np.ndarray, heating: np.ndarray) -> Model:
