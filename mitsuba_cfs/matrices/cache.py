@@ -29,6 +29,7 @@ from mitsuba_cfs.source_code import code_version
 
 VARIABLE = "CFS_CACHE"  # environment variable with the folder
 DEFAULT_LIMIT = 4 << 30  # [bytes] of all files; the longest unused go first
+SMALL = 500  # files of less than the limit divided by this, as a building's, go after all others
 RECENT_HASHES = 32  # of dataclasses
 PLAIN = {type(None), bool, int, float, str, bytes}  # whose `repr` tells values apart
 # RuntimeError: of zipfile, for a damaged file that seems encrypted or otherwise compressed
@@ -145,9 +146,13 @@ class MatrixCache:
         return CacheEntry(self, self.folder / f"{label.replace(' ', '-')}-{key[:40]}.npz")
 
     def trim(self, keep: Path | None = None) -> None:
-        """Delete the longest unused files until the folder holds less than the limit."""
+        """Delete the longest unused files until the folder holds less than the limit.
+
+        Small ones go last: they free little space and are often the dearest, as a building's.
+        """
         result = [(file, _status(file)) for file in self.folder.glob("*.npz")]
-        files = sorted(((file, status) for file, status in result if status), key=lambda item: item[1].st_mtime)
+        files = [(file, status) for file, status in result if status]
+        files.sort(key=lambda item: (item[1].st_size * SMALL < self.limit, item[1].st_mtime))
         total = sum(status.st_size for _, status in files)
         for file, status in files:
             if total <= self.limit:
@@ -187,7 +192,7 @@ class CacheEntry:
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             with replacing(self.path) as part:
-                np.savez(part, **arrays)  # type: ignore[arg-type] # its stub takes a flag by name
+                _write_arrays(part, arrays)
             if finished:
                 self.cache.trim(keep=self.path)
         except (OSError, DataError) as error:
@@ -203,6 +208,21 @@ class CacheEntry:
         """Write the state of batches."""
         arrays = {one.name: getattr(state, one.name) for one in fields(state)}
         self.write(arrays, finished=state.finished)
+
+
+def _write_arrays(path: Path, arrays: Mapping[str, object]) -> None:
+    """An archive as of `np.savez`, in which arrays that are mostly zeros are compressed.
+
+    Matrices of windows and patches are 75 to 99 % zeros: 8 to 50 times smaller at 200 to 400 MB/s;
+    others shrink little, and take ten times as long.
+    """
+    with zipfile.ZipFile(path, "w", compresslevel=1) as archive:
+        for name, value in arrays.items():
+            array = np.asanyarray(value)
+            mostly_zero = array.dtype.kind == "f" and 2 * np.count_nonzero(array) < array.size
+            archive.compression = zipfile.ZIP_DEFLATED if mostly_zero else zipfile.ZIP_STORED
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as stream:
+                np.lib.format.write_array(stream, array, allow_pickle=False)
 
 
 def _batch_mean(data: Mapping[str, NDArray[Any]]) -> BatchMean | None:

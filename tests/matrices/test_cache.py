@@ -118,6 +118,32 @@ def test_the_longest_unused_files_go_first(cache):
     assert set(cache.folder.iterdir()) == {oldest_left}
 
 
+def test_small_files_go_after_larger_ones(cache):
+    small = replace(cache, limit=1 << 20)
+    building = small.entry("building", 1, by=BY)
+    building.write({"text": np.zeros(100, dtype=np.uint8)})
+    os.utime(building.path, (1, 1))
+    for number in range(20):
+        matrix = small.entry("m", number, by=BY)
+        matrix.write({"mean": np.full((100, 100), number + 1.0)})
+    assert building.path.exists() and matrix.path.exists()
+    assert sum(file.stat().st_size for file in cache.folder.iterdir()) <= small.limit
+
+
+def test_zeros_take_little_space(cache):
+    cells, dense = np.zeros((132, 145, 146), dtype=np.float32), np.linspace(0.1, 0.9, 10_000)
+    cells[::40, ::7] = 0.25
+    entry = cache.entry("cells", 1, by=BY)
+    entry.write({"cells": cells, "dense": dense, "count": np.int64(3)})
+    assert entry.path.stat().st_size < dense.nbytes + cells.nbytes / 50
+    stored = entry.read(lambda data: {name: data[name] for name in data})
+    assert np.array_equal(stored["cells"], cells) and stored["cells"].dtype == np.float32
+    assert np.array_equal(stored["dense"], dense) and stored["count"] == 3
+    again = cache.entry("cells", 2, by=BY)
+    again.write({"cells": cells, "dense": dense, "count": np.int64(3)})
+    assert again.path.read_bytes() == entry.path.read_bytes()
+
+
 def test_every_input_counts():
     room, groups = rooms.test_room()
     darker = replace(room, reflectance=room.reflectance * 0.99)

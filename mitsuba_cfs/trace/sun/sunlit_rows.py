@@ -141,8 +141,10 @@ class SunlitRows:
 
 
 def sparse_arrays(name: str, matrix: sparse.csr_array) -> dict[str, NDArray[Any]]:
-    """A sparse matrix as the arrays of a file."""
-    return {f"{name}_{part}": np.asarray(getattr(matrix, part)) for part in SPARSE}
+    """A sparse matrix as the arrays of a file, numbers of columns in 32 bits where these suffice."""
+    kind = sparse.get_index_dtype(maxval=max(matrix.nnz, *matrix.shape))
+    arrays = {f"{name}_{part}": np.asarray(getattr(matrix, part)) for part in SPARSE}
+    return arrays | {f"{name}_{part}": arrays[f"{name}_{part}"].astype(kind) for part in ("indices", "indptr")}
 
 
 def sparse_matrix(data: Mapping[str, NDArray[Any]], name: str) -> sparse.csr_array:
