@@ -26,12 +26,11 @@ from scenes.head import Head, head_of
 from scenes.input_files import InputFiles, building_of, named_files, read_files
 from scenes.input_options import NO_OPTIONS, InputOptions
 from scenes.room.control_groups import shared_groups
+from scenes.room.ground import assumed_ground_note, ground_note
 from scenes.room.operation import (
     Operation,
-    assumed_ground_note,
     check_schedules,
     check_states,
-    ground_note,
     stated_note,
     unstated_note,
     used_operation,

@@ -141,7 +141,7 @@ def test_data_files_are_packed_into_the_wheel(package: str) -> None:
     settings = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["tool"]["setuptools"]
     endings = {pattern.removeprefix("**/*") for pattern in settings["package-data"]["*"]}
     files = [path for path in (REPOSITORY / package).rglob("*") if path.is_file()]
-    data = [path for path in files if path.suffix not in {".py", ".pyc", ".nbi", ".nbc"}]
+    data = [path for path in files if path.suffix != ".py" and "__pycache__" not in path.parts]
     unpacked = [file_name(path) for path in data if path.suffix not in endings]
     assert not unpacked
 

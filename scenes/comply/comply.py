@@ -56,11 +56,12 @@ from scenes.report.method import METHODS
 from scenes.room.control_groups import same_control
 from scenes.room.daylight import overcast_factor
 from scenes.room.glare import rating_of
+from scenes.room.ground import assumed_ground_note
 from scenes.room.heat import heat_alone
 from scenes.room.inputs import RoomInputs, room_inputs, skies_for
 from scenes.room.light import RoomLight, grid_points, room_light
 from scenes.room.luminaires import lamp_spectra
-from scenes.room.operation import Operation, assumed_ground_note, check_states, used_operation, weekday_note
+from scenes.room.operation import Operation, check_states, used_operation, weekday_note
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions, SensorGrid
 from scenes.room.room import StageTimes, asked_year, inputs_of_room

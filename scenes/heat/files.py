@@ -12,7 +12,8 @@ from scenes.fenestration.thermal_system import checked_system
 from scenes.heat.measured_weather import read_measured
 from scenes.heat.study_file import StudyFile
 from scenes.input_files import InputFiles, check_names, read_weather
-from scenes.room.operation import YEAR_DAYS, check_schedules, read_state
+from scenes.room.ground import YEAR_DAYS
+from scenes.room.operation import check_schedules, read_state
 
 
 @dataclass(frozen=True, slots=True)

@@ -36,6 +36,7 @@ from scenes.heat.files import HeatFiles, read_files
 from scenes.heat.study_file import StudyFile
 from scenes.inputs import Inputs, every_state, inputs_of, unused_rules
 from scenes.results import ShadingYear
+from scenes.room.ground import ground_note
 from scenes.room.heat import felt_by, room_humidity, step_issues
 from scenes.room.inputs import room_inputs, skies_for
 from scenes.room.leaks import leak_issues
@@ -44,7 +45,6 @@ from scenes.room.operation import (
     Operation,
     OperationHours,
     check_schedules,
-    ground_note,
     stated_note,
     unstated_note,
     weekday_note,

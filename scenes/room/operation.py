@@ -14,7 +14,6 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from bim.ground_floor import ground_floor
 from bim.model import Building, Space
 from bim.use import ScheduledValue, StatedUse, YearSchedule
 from mitsuba_cfs.errors import DataError
@@ -28,7 +27,7 @@ from scenes.fenestration.thermal_system import checked_system
 from scenes.fenestration.tilts import tilt_states
 from scenes.language.catalogue import N_
 from scenes.room.luminaires import placed_spectrum
-from scenes.room.operation_tables import PARTS, GainsTable, GroundTable, OperationTables, RoomsTable, operated_tables
+from scenes.room.operation_tables import PARTS, GainsTable, OperationTables, RoomsTable, operated_tables
 from scenes.room.options import RoomOptions
 from scenes.room.schedules import WEEK, ScheduleTable, scheduled_fields
 from scenes.room.shading_rules import WEATHER_RULES, ShadingRule
@@ -284,7 +283,6 @@ class OperationHours:
 
 
 Tables = TypeVar("Tables", bound=OperationTables)
-YEAR_DAYS = 360  # of weather that make a year
 PREFIX = "of the building's file: "  # of the names of schedules that the building's file contains
 
 
@@ -594,41 +592,6 @@ def weekday_note(tables: Iterable[OperationTables], weather: Weather) -> tuple[s
         "Schedules by weekday: 1 January is a {day}, as in {year}, because the weather file's header states none.",
         day=Note(WEEKDAYS[first.replace(month=1, day=1).day_of_week]),
         year=str(first.year),
-    )
-    return (note,)
-
-
-def ground_note(tables: OperationTables, building: Building) -> tuple[str, ...]:
-    """Sentences on the ground that is assumed, and on what the ground around a basement lacks."""
-    envelopes = [one.envelope for one in tables.variants]
-    grounds = [one.ground for one in envelopes]
-    stated = [one.ground is not None or any("floor" in n.faces for n in one.neighbour) for one in envelopes]
-    return (*(() if all(stated) else assumed_ground_note(building)), *_basement_note(grounds))
-
-
-def assumed_ground_note(building: Building) -> tuple[str, ...]:
-    """A sentence on the ground below floors of which no `[envelope.ground]` is stated; empty without such floors."""
-    area, perimeter = ground_floor(building)
-    if min(area, perimeter) <= 0:
-        return ()
-    note = Note(
-        "Floors on the ground without [envelope.ground] are computed by ISO 13370 with {area:.0f} m2 and "
-        "{perimeter:.0f} m of outer walls of the building's rooms, walls of 0.3 m, on sand (2 W/mK), "
-        "without edge insulation.",
-        area=area,
-        perimeter=perimeter,
-    )
-    return (note,)
-
-
-def _basement_note(grounds: Sequence[GroundTable | None]) -> tuple[str, ...]:
-    """A sentence on what the ground around a basement lacks; empty without a basement."""
-    if not any(one is not None and one.kind.endswith("basement") for one in grounds):
-        return ()
-    note = Note(
-        "Basement by ISO 13370: sun and longwave radiation at the surface of the ground are "
-        "neglected. Below bare ground in a sunny climate (Boulder, Colorado) a basement is warmer "
-        "than computed, by 0.9 K in the annual mean and up to 3.4 K in summer."
     )
     return (note,)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from bim.defaults import FILMS
-from bim.ground_floor import DOWNWARDS, buried_depth, ground_floor
 from bim.model import Building, Face, Space, Window
 from bim.outer_faces import OuterFaces, outer_faces
 from bim.to_thermal import ThermalRoom, coupled_rooms, door_links, surface_neighbours, thermal_room
@@ -27,9 +26,10 @@ from mitsuba_cfs.trace.kernels.estimate import cache_entry
 from mitsuba_cfs.trace.matrices.view_factors import sky_shares
 from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
 from scenes.results import DaylightResult, ShadingYear
+from scenes.room.ground import grounded
 from scenes.room.inputs import RoomInputs
-from scenes.room.operation import YEAR_DAYS, OperationHours
-from scenes.room.operation_tables import GainsTable, GroundTable, NeighbourTable, OperationTables
+from scenes.room.operation import OperationHours
+from scenes.room.operation_tables import GainsTable, NeighbourTable, OperationTables
 from scenes.room.options import Occupancy
 from scenes.room.shading import RuledYear
 from scenes.room.shading_rules import JOINT_RULES
@@ -39,22 +39,9 @@ from thermal.balance import BalanceOptions, ZoneResult, simulate_zones
 from thermal.climate import Climate, Solar, sky_temperature, undisturbed_ground
 from thermal.control import Condition, TemperatureControl
 from thermal.errors import ThermalInputError
-from thermal.ground import (
-    SOILS,
-    Footprint,
-    GroundElement,
-    Soil,
-    basement,
-    harmonic,
-    over_unheated_basement,
-    slab_on_ground,
-    suspended_floor,
-)
 from thermal.kernel import advance
 from thermal.ventilation import AirTransfer
 from thermal.zone import Dimming, Gains, Layer, OpaqueSurface, Zone, dimmed_light, dimmed_share, split_gains
-
-LEAST_DEPTH = 0.05  # [m] of walls in the ground that make a basement
 
 
 def enveloped(
@@ -85,12 +72,8 @@ def enveloped(
         hours = OperationHours(tables, weather)
         places = [f"envelope.neighbour.{number}" for number in range(len(envelope.neighbour))]
         behind = [_named(table, faces, building, at) for table, at in zip(envelope.neighbour, places, strict=True)]
-        if envelope.ground is not None:
-            surfaces = _grounded(surfaces, envelope.ground, weather)
-        elif (ground := default_ground(building, space, weather)) is not None:
-            stated = {i for named in behind for i in named}  # goes before what is assumed
-            kept = {i for i, one in enumerate(surfaces) if i in stated or not _in_ground(one, ground)}
-            surfaces = _grounded(surfaces, ground, weather, kept)
+        stated = {i for named in behind for i in named}
+        surfaces = grounded(surfaces, envelope.ground, building, space, weather, stated)
         for table, place, named in zip(envelope.neighbour, places, behind, strict=True):
             beyond = hours.value(table, "temperature_c", place)
             for i in named:
@@ -113,99 +96,6 @@ def glass_edge(window: Window) -> float:
             sides[tuple(sorted((tuple(start), tuple(end))))] += 1
     edges = [np.subtract(*pair) for pair, count in sides.items() if count == 1]
     return float(sum(np.linalg.norm(side) for side in edges))
-
-
-def default_ground(building: Building, space: Space, weather: Weather) -> GroundTable | None:
-    """The ground below a room of which nothing is stated: ISO 13370 with area and perimeter of the building.
-
-    A room with walls in the ground is a basement as deep as these.  None: undisturbed soil at the outer face, for
-    weather of less than a year, and for a building without floors on the ground or outer walls above them.
-    """
-    on_ground = any(face.adjacency == "ground" for face in space.faces)
-    if not on_ground or len(weather.times) * weather.step_h < 24.0 * YEAR_DAYS:
-        return None
-    area, perimeter = ground_floor(building)
-    if min(area, perimeter) <= 0:
-        return None
-    depth = buried_depth(space)
-    kind = {"kind": "basement", "depth": depth} if depth > LEAST_DEPTH else {"kind": "slab"}
-    return GroundTable.model_construct(area=area, perimeter=perimeter, **kind)
-
-
-def _in_ground(surface: OpaqueSurface, table: GroundTable) -> bool:
-    """Whether ISO 13370 has the surface: a floor, or a wall of a basement."""
-    downwards = surface.normal[2]
-    return downwards < DOWNWARDS or (table.kind == "basement" and abs(downwards) < -DOWNWARDS)
-
-
-def _grounded(
-    surfaces: Sequence[OpaqueSurface], table: GroundTable, weather: Weather, kept: Collection[int] = ()
-) -> list[OpaqueSurface]:
-    """The surfaces, those on the ground with soil and virtual layer (ISO 13370), but for those that are kept."""
-    days = weather.midpoints
-    hours = (days.day_of_year.to_numpy() - 1) * 24.0 + days.hour.to_numpy() + days.minute / 60.0
-    year = harmonic(weather.dry_bulb_c, hours)
-    wind = float(np.mean(weather.wind_speed))
-    floors = [s for s in surfaces if s.outside == "ground" and s.normal[2] < DOWNWARDS]
-    area = table.area or sum(s.area for s in floors)
-    grounded = []
-    for number, surface in enumerate(surfaces):
-        if surface.outside != "ground" or number in kept:
-            grounded.append(surface)
-            continue
-        element = _element(surface, floors, table, area, wind)
-        grounded.append(
-            replace(
-                surface,
-                layers=element.layers(surface.layers),
-                outside="known",
-                beyond_c=element.temperature(table.indoor_c, *year, hours),
-            )
-        )
-    return grounded
-
-
-def _element(
-    one: OpaqueSurface, floors: Sequence[OpaqueSurface], table: GroundTable, area: float, wind: float
-) -> GroundElement:
-    """The floor or wall by ISO 13370."""
-    soil = SOILS[table.soil]
-    soil = Soil(table.conductivity or soil.conductivity, table.heat_capacity or soil.heat_capacity)
-    if not floors and table.area is None:
-        raise ThermalInputError("ground", "area: is needed where a room has no floor on the ground")
-    footprint = Footprint(area, table.perimeter, table.wall_thickness, soil)
-    resistance = sum(layer.resistance for layer in one.layers)
-    is_floor = one.normal[2] < DOWNWARDS
-    if table.kind == "basement":
-        floor = sum(layer.resistance for layer in floors[0].layers) if floors else resistance
-        if is_floor:
-            return basement(footprint, resistance, table.wall_resistance, table.depth)[0]
-        return basement(footprint, floor, resistance, table.depth)[1]
-    if not is_floor:
-        raise ThermalInputError("ground", f"{one.name}: a wall below ground needs kind = 'basement' and its depth")
-    if table.kind == "slab":
-        vertical = table.edge_lies == "vertical"
-        return slab_on_ground(footprint, resistance, edge=table.edge, vertical=vertical)
-    if table.kind == "suspended":
-        return suspended_floor(
-            footprint,
-            resistance,
-            height=table.height,
-            wall_u=table.wall_u,
-            vents=table.vents,
-            wind=wind,
-            shield=table.shield,
-            ground_resistance=table.below_resistance,
-        )
-    return over_unheated_basement(
-        footprint,
-        resistance,
-        depth=table.depth,
-        height=table.height,
-        wall_u=table.wall_u,
-        floor_resistance=table.below_resistance,
-        wall_resistance=table.wall_resistance,
-    )
 
 
 def _named(table: NeighbourTable, faces: Sequence[Sequence[Face]], building: Building, place: str) -> list[int]:

@@ -16,9 +16,10 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.weather import Weather
 from scenes.demo import WEATHER
-from scenes.room.operation import OperationHours, check_schedules, ground_note
+from scenes.room.ground import default_ground, ground_note
+from scenes.room.operation import OperationHours, check_schedules
 from scenes.room.operation_tables import OperationTables
-from scenes.room.zone import default_ground, enveloped, glass_edge
+from scenes.room.zone import enveloped, glass_edge
 from scenes.toml_file import validated
 from thermal.blackbox import Fenestration
 from thermal.ground import SOILS, Footprint, basement, slab_on_ground

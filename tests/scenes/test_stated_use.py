@@ -19,8 +19,9 @@ from scenes.head import head_of, unused_notes
 from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
 from scenes.input_files import read_weather
+from scenes.room.ground import ground_note
 from scenes.room.inputs import FileSensors
-from scenes.room.operation import OperationHours, ground_note, stated_note, unstated_note, with_stated_uses
+from scenes.room.operation import OperationHours, stated_note, unstated_note, with_stated_uses
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.room.room import compute_room
