@@ -8,6 +8,7 @@ repeated one by one; a task that crashes a process of its own has failed.
 from __future__ import annotations
 
 import logging
+import os
 import pickle
 from collections import defaultdict, deque
 from collections.abc import Callable, Generator, Iterator, Sequence
@@ -31,6 +32,8 @@ T = TypeVar("T")
 R = TypeVar("R")
 AHEAD = 2  # tasks submitted for each process: one that runs and one that waits
 FETCHED = 8  # results of a cluster that are fetched ahead of their use
+TASKS_A_PROCESS = 8  # at least, by default: fewer take no longer than a process needs to begin
+MEMORY_A_PROCESS = 2 << 30  # [bytes] of half the machine's memory, by default
 
 log = logging.getLogger(__name__)
 
@@ -125,6 +128,20 @@ class Tasks(Generic[T, R]):
         results = cluster.results(leaders, lambda item: followers.pop(self.key(item), []))
         with closing(results):
             yield from _fetched(results, cluster.stop)
+
+
+def processes_for(tasks: int, asked: int | None) -> int:
+    """Number of parallel processes for some tasks: the one asked for, or by cores and memory.
+
+    Most of a room's time is spent outside the traced kernels, on one core.
+    """
+    if asked is not None:
+        return asked
+    cores = os.cpu_count() or 1
+    if hasattr(os, "sysconf"):  # not on Windows
+        memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+        cores = min(cores, memory // 2 // MEMORY_A_PROCESS)
+    return max(min(cores, tasks // TASKS_A_PROCESS), 1)
 
 
 def _fetched(ready: Iterator[R], cancel: Callable[[], object]) -> Iterator[R]:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @click.command(cls=StrictCommand)
 @click.argument("design", type=FILE, metavar="DESIGN.toml")
 @out_folder_option
-@processes_option
+@processes_option(1, "1 by default, because candidates depend on those computed beside them")
 @scheduler_option
 @page_option
 def command(design: Path, *, out: Path, processes: int, scheduler: str | None, page: Path | None) -> None:

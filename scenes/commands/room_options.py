@@ -491,13 +491,13 @@ def named_settings(settings: Sequence[str], but: Collection[str] = ()) -> dict[s
     return {name: getattr(result, name) for name in table}
 
 
-processes_option = click.option(
-    "--processes",
-    type=click.IntRange(1, 64),
-    default=1,
-    show_default=True,
-    help="Rooms or cases computed in parallel; a single one already uses most cores.",
-)
+def processes_option(default: int | None, rest: str) -> Option:
+    """`--processes`; the `rest`: how many are the default."""
+    help_text = f"Rooms or cases computed in parallel; {rest}."
+    return click.option("--processes", type=click.IntRange(1, 64), default=default, help=help_text)
+
+
+BY_MACHINE = "by default as many as cores and memory allow, with at least eight rooms or cases each"
 scheduler_option = click.option(
     "--scheduler",
     metavar="ADDRESS",

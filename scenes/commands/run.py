@@ -13,6 +13,7 @@ from mitsuba_cfs.methods import METHODS
 from scenes import quick as quick_run
 from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import (
+    BY_MACHINE,
     FILE,
     PrintedHead,
     bands_option,
@@ -119,7 +120,7 @@ class Percentage(click.ParamType):
 )
 @click.option("--no-colour", is_flag=True, help="Omit the colour picture of each room; implied by --quick.")
 @explore_option()
-@processes_option
+@processes_option(None, BY_MACHINE)
 @scheduler_option
 @click.option(
     "--error",
@@ -132,7 +133,7 @@ class Percentage(click.ParamType):
 )
 @click.option("--netcdf", is_flag=True, help="Also write all results to results.nc, for xarray; see docs/formats.md.")
 def command(
-    out: Path, page: Path | None, settings: tuple[str, ...], processes: int, scheduler: str | None, **chosen
+    out: Path, page: Path | None, settings: tuple[str, ...], processes: int | None, scheduler: str | None, **chosen
 ) -> None:
     """Compute daylight, glare, temperatures and comfort of a building's rooms.
 
@@ -156,7 +157,7 @@ def command(
 
 
 def run_to_folder(
-    options: JobOptions, out: Path, page: Path | None = None, *, processes: int = 1, scheduler: str | None = None
+    options: JobOptions, out: Path, page: Path | None = None, *, processes: int | None = 1, scheduler: str | None = None
 ) -> None:
     """Run the job with a progress bar, say what comes out room by room, and write its files."""
     from mitsuba_cfs.matrices.cache import default_folder
@@ -179,7 +180,6 @@ def run_to_folder(
     from scenes.result_folder import EXPLORER
     from scenes.run.run import Workers, run_job
 
-    beside = processes > 1 or scheduler is not None
     if options.quick:
         click.echo(quick_run.NOTE)
     lines, head, plan = _RoomLines(), PrintedHead(), _FirstPlan(folder, page_options.language)
@@ -192,7 +192,7 @@ def run_to_folder(
             on_light=lines.light,
             on_head=head,
             on_plan=plan,
-            workers=Workers(processes, scheduler) if beside else None,
+            workers=Workers(processes, scheduler),
         )
         progress("results", 0.0)
         from scenes.explore.folder import write_explorer  # half a second, which the first plan does not wait for

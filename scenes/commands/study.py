@@ -12,6 +12,7 @@ from bim.report.issue import issue_text
 from scenes import quick as quick_run
 from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import (
+    BY_MACHINE,
     FILE,
     PrintedHead,
     check_is_ifc,
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 @click.command(cls=StrictCommand)
 @click.argument("study", type=FILE, metavar="STUDY.toml")
 @out_folder_option
-@processes_option
+@processes_option(None, BY_MACHINE)
 @scheduler_option
 @method_option(["auto"], "auto: chosen by cost and error, instead of the file's")
 @click.option("--time-budget", metavar="TIME", help="Time limit of the whole study for --method auto: 90s, 20min, 2h.")
@@ -55,7 +56,7 @@ def command(
     study: Path,
     *,
     out: Path,
-    processes: int,
+    processes: int | None,
     scheduler: str | None,
     method: str | None,
     time_budget: str | None,
@@ -86,7 +87,7 @@ def study_to_folder(
     file: Path,
     parsed: Study,
     out: Path,
-    processes: int = 1,
+    processes: int | None = 1,
     scheduler: str | None = None,
     write_ifc: Path | None = None,
     *,
@@ -106,12 +107,14 @@ def study_to_folder(
     from scenes.study.write_ifc import write_study_ifc
     from scenes.study_report import write_study_report
     from scenes.study_report.page import explorable, write_study_explorer
+    from scenes.workers import processes_for
 
     if parsed.quick:
         click.echo(quick_run.NOTE)
     plan = settled(parsed, plan_of(parsed))
     chosen: dict[int, Case] = {}
     head = PrintedHead()
+    processes = processes_for(len(plan.cases), processes)
     _check_explorable(plan, explore)
     _print_plan(plan)
     with ProgressBar() as progress, compiled_beside():

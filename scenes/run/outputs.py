@@ -29,9 +29,7 @@ from scenes.room.glare import glare_table
 from scenes.run.netcdf import NAME as NETCDF
 from scenes.run.netcdf import write_netcdf
 from scenes.user_errors import user_message
-from scenes.workers import Tasks
-
-ROOMS_A_PROCESS = 8
+from scenes.workers import TASKS_A_PROCESS, Tasks, processes_for
 
 
 def write_results(
@@ -41,7 +39,7 @@ def write_results(
     write_explorer=None,
     *,
     netcdf: bool = False,
-    processes: int = 1,
+    processes: int | None = 1,
     first_plan: str = "",
     progress: Progress = silent,
 ) -> None:
@@ -51,7 +49,7 @@ def write_results(
         write_report: `scenes.report.write_report`, or None for no report.
         write_explorer: `scenes.explore.folder.write_explorer`, or None for no explorer.
         netcdf: whether all numbers are written as one netCDF file besides.
-        processes: that many rooms' files are written at a time.
+        processes: that many rooms' files are written at a time; None: as of `processes_for`.
         first_plan: the table of the first plan, where there was one.
 
     Captions in pictures are in the language of `in_language`. A fault of the program in one of
@@ -100,7 +98,7 @@ def _faults(write: Callable[[RunResult, Path], None], result: RunResult, page: P
     return []
 
 
-def _write_rooms(result: RunResult, places: Sequence[Path], processes: int, progress: Progress) -> None:
+def _write_rooms(result: RunResult, places: Sequence[Path], processes: int | None, progress: Progress) -> None:
     """The files of each room in its folder."""
     rooms = list(zip(result.spaces, places, strict=True))
     tasks = Tasks(
@@ -111,7 +109,7 @@ def _write_rooms(result: RunResult, places: Sequence[Path], processes: int, prog
         scene=lambda item: item[0].space.guid,
     )
     # a process takes as long to begin as it does to write some rooms
-    processes = min(processes, len(rooms) // ROOMS_A_PROCESS)
+    processes = min(processes_for(len(rooms), processes), len(rooms) // TASKS_A_PROCESS)
     with closing(tasks.results(processes=processes)) as written:
         passed = zip(result.spaces, written, strict=True)
         for number, (_, error) in enumerate(passed, 1):  # a room passed goes out of memory

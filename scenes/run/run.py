@@ -53,7 +53,7 @@ from scenes.room.zone import RoomZone
 from scenes.run.first_plan import FROM, OnPlan, first_plan, options_for_error
 from scenes.run.options import JobOptions
 from scenes.run.together import RoomsTogether
-from scenes.workers import Tasks
+from scenes.workers import Tasks, processes_for
 
 OnLight = Callable[[DaylitRoom], None]  # called with the light of each room, before its heat
 OnRoom = Callable[[RoomYear], None]  # called with each room as soon as it is computed
@@ -63,8 +63,13 @@ OnRoom = Callable[[RoomYear], None]  # called with each room as soon as it is co
 class Workers:
     """Processes or cluster that compute the rooms of a run in parallel."""
 
-    processes: int = 1  # on this machine, a room each
+    processes: int | None = 1  # on this machine, a room each; None: as many as `processes_for` has
     scheduler: str | None = None  # address of a Dask scheduler; its workers replace the processes
+
+    def for_rooms(self, rooms: int) -> Workers | None:
+        """The same for a number of rooms; None: this process computes them."""
+        processes = processes_for(rooms, self.processes)
+        return None if processes == 1 and self.scheduler is None else Workers(processes, self.scheduler)
 
 
 def computed_rooms(
@@ -101,6 +106,8 @@ def computed_rooms(
     store = StoredArrays() if len(spaces) > 1 else None
     with scratch_folder() as folder:
         equal = template_rooms(spaces)
+        if workers is not None:
+            workers = workers.for_rooms(len(equal))
         together = RoomsTogether(inputs, equal, skies, options, folder)
         work = RoomWork(inputs, spaces, skies, options, together, with_heat=not coupled)
         series = RoomSeries(

@@ -29,7 +29,7 @@ from scenes.run import outputs
 from scenes.run import run as rooms
 from scenes.run.options import JobOptions
 from scenes.run.run import Workers, run_inputs, run_job
-from scenes.workers import Tasks
+from scenes.workers import Tasks, processes_for
 from tests.conftest import REPOSITORY
 from tests.scenes.small_box import BOX, ROOM, SMALL
 from tests.scenes.test_equal_rooms import moved
@@ -314,3 +314,29 @@ def test_followers_of_a_task_that_ends_its_process_are_done():
     tasks = Tasks(items, ends_its_process, said_of, key=str, scene=lambda _: "one")
     results = list(tasks.results(processes=2))
     assert sorted(one.partition(" ")[0] for one in results) == ["always", "n:1", "n:2"]
+
+
+@pytest.mark.parametrize(
+    ("tasks", "cores", "memory", "expected"),
+    [
+        (73, 2, 24, 2),
+        (73, 16, 128, 9),
+        (73, 16, 16, 4),
+        (73, 16, 2, 1),
+        (15, 16, 128, 1),
+        (16, 16, 128, 2),
+        (0, 4, 24, 1),
+    ],
+)
+def test_processes_by_cores_memory_and_tasks(monkeypatch, tasks, cores, memory, expected):
+    monkeypatch.setattr(os, "cpu_count", lambda: cores)
+    pages = {"SC_PAGE_SIZE": 4096, "SC_PHYS_PAGES": memory * 2**30 // 4096}
+    monkeypatch.setattr(os, "sysconf", pages.__getitem__)
+    assert processes_for(tasks, None) == expected
+    assert processes_for(tasks, 3) == 3
+
+
+def test_a_run_of_few_rooms_begins_no_process():
+    assert Workers(None).for_rooms(15) is None
+    assert Workers(3).for_rooms(15) == Workers(3)
+    assert Workers(None, "tcp://host:8786").for_rooms(15).scheduler == "tcp://host:8786"
