@@ -110,7 +110,7 @@ def test_what_is_no_fault_of_a_room_ends_the_run():
 
 def test_a_folder_that_cannot_be_written_ends_the_processes(tmp_path):
     """At once: not when the exception that somebody holds is let go."""
-    spaces = [box(f"{number}", 4.0) for number in range(2 * outputs.ROOMS_A_PROCESS)]
+    spaces = [box(f"{number}", 4.0) for number in range(2 * outputs.TASKS_A_PROCESS)]
     years = [SimpleNamespace(space=space) for space in spaces]
     result = SimpleNamespace(spaces=years, times=None)
     with pytest.raises(OSError, match="no-folder") as held:
