@@ -15,7 +15,7 @@ from tests.report.synthetic import run_result
 @pytest.mark.parametrize("processes", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_files_of_rooms_beside_each_other(processes, tmp_path, monkeypatch):
     """The same, and each room is told of."""
-    monkeypatch.setattr(outputs, "ROOMS_A_PROCESS", 1)
+    monkeypatch.setattr(outputs, "TASKS_A_PROCESS", 1)
     result, told = run_result(picture_size=60, pictures=1), []
     for name, count in (("one", 1), ("some", processes)):
         outputs.write_results(
@@ -33,7 +33,7 @@ def test_files_of_rooms_beside_each_other(processes, tmp_path, monkeypatch):
 @pytest.mark.parametrize("processes", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_a_room_that_cannot_be_written_ends_the_writing(processes, tmp_path, monkeypatch):
     """Nothing is left of it, and the fault is told as it is in this process."""
-    monkeypatch.setattr(outputs, "ROOMS_A_PROCESS", 1)
+    monkeypatch.setattr(outputs, "TASKS_A_PROCESS", 1)
     result = run_result(picture_size=60, pictures=1)
     first, second = result.spaces
     (picture,) = second.glare.pictures
