@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +39,9 @@ def main(measured: Path, *, clear: str = "cie", spectra: Path | None = None) -> 
     position = SINGAPORE.get_solarposition(times)
     high = position["elevation"].to_numpy() >= LOWEST_DEG
     table, times, position = table[high], times[high], position[high]
-    split = pvlib.irradiance.erbs(table["GlobalIrrad"].to_numpy(), position["zenith"], times)
+    split = pvlib.irradiance.erbs(
+        table["GlobalIrrad"].to_numpy(), position["zenith"].to_numpy(), times.day_of_year.to_numpy()
+    )
     sky = _sky(position, split, times)
     own = detected(sky_spectra(sky, WATER_CM, clear).horizontal)
     kelvin, true = colour_temperature(own[:, -3:])[0], table["CCT"].to_numpy(dtype=float)
@@ -54,6 +57,8 @@ def main(measured: Path, *, clear: str = "cie", spectra: Path | None = None) -> 
     kinds["morning and evening"] = sorted(set(table["SkyType"]) - set(known))
     for label, names in kinds.items():
         some = table["SkyType"].isin(names).to_numpy()
+        if not some.any():
+            continue
         mired = 1e6 / kelvin[some] - 1e6 / true[some]
         lines.append(
             f"| {label} | {np.count_nonzero(some)} | {np.median(true[some]):.0f} | "
@@ -84,7 +89,7 @@ def _ratios(own: NDArray[np.float64], measured: NDArray[np.float64]) -> str:
     )
 
 
-def _sky(position: pd.DataFrame, split: pd.DataFrame, times: pd.DatetimeIndex) -> AnnualSky:
+def _sky(position: pd.DataFrame, split: Mapping[str, NDArray[np.float64]], times: pd.DatetimeIndex) -> AnnualSky:
     azimuth, height = (np.radians(position[name]) for name in ("azimuth", "elevation"))
     towards = np.stack([np.sin(azimuth) * np.cos(height), np.cos(azimuth) * np.cos(height), np.sin(height)], axis=1)
     return given_sky(
@@ -92,6 +97,6 @@ def _sky(position: pd.DataFrame, split: pd.DataFrame, times: pd.DatetimeIndex) -
         np.asarray(split["dni"]),
         np.asarray(split["dhi"]),
         1,
-        day_of_year=times.dayofyear.to_numpy(),
+        day_of_year=times.day_of_year.to_numpy(),
         dew_point_c=24.0,
     )
