@@ -46,7 +46,7 @@ from mitsuba_cfs.methods.coefficients import (
 )
 from mitsuba_cfs.methods.coloured_room import RoomInBand, rooms_in_bands
 from mitsuba_cfs.methods.light import SeasonalLight, seasons_of
-from mitsuba_cfs.methods.optics import SystemOptics, combinations
+from mitsuba_cfs.methods.optics import States, SystemOptics, combinations, neighbours
 from mitsuba_cfs.methods.phase_light import (
     PhaseLight,
     SensorLight,
@@ -172,9 +172,11 @@ def spectral_light(
             raise ValueError("path tracing has no matrices: expected the light of a phase method")
         water = np.broadcast_to(np.asarray(water_cm, dtype=float), (hours_of_all,))[hours]
         skies = sky_spectra(phase.sky, water, clear, ground=ground)
-        season = _Season(with_sensor_light(phase), factors, channels, skies, reflectance)
-        outdoors += season.sky.horizontal.sum(axis=0)
         rows = states_of(phase, None if state is None else state[:, hours])
+        season = _Season(
+            with_sensor_light(phase), _occurring(factors, phase.systems, rows), channels, skies, reflectance
+        )
+        outdoors += season.sky.horizontal.sum(axis=0)
         for kind, some in combinations(rows):
             modes = season.modes_in(kind, some)
             for one, whole in zip(wanted, received, strict=True):
@@ -185,6 +187,21 @@ def spectral_light(
                     whole[..., hours[some]] = values
         progress("spectral", (i + 1) / len(parts))
     return SpectralLight(tuple(received), outdoors)
+
+
+def _occurring(factors: Factors, systems: Sequence[States], rows: NDArray[np.int64]) -> Factors:
+    """The factors of the states that occur in hours [G, L]; a state that does not has that of one that does.
+
+    Each factor more is modes more, in each of which all light is computed.
+    """
+    found = []
+    for of, states, row in zip(factors, systems, rows, strict=True):
+        used = set(np.unique(row).tolist())
+        for j in tuple(used):
+            used |= set((neighbours(states, j) or ())[:2])
+        other = replace(of[min(used, default=0)], slats=None)
+        found.append([one if j in used else other for j, one in enumerate(of)])
+    return found
 
 
 def sky_spectra(

@@ -237,7 +237,7 @@ def received(light: PhaseLight, window: Window, channels: Channels, reflectance:
     """The light of the points by some bands."""
     wanted = [Detection(channels.detection)]
     [values] = spectral_light(light, [[window.factor]], channels, wanted, reflectance=reflectance).received
-    return Light.of(values[..., 0].T)
+    return Light.of(values[..., 0].T.astype(np.float64))
 
 
 def photopic_light(window: Window, sky: AnnualSky, scene: DaylightScene) -> PhaseLight:
