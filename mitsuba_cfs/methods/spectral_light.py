@@ -443,7 +443,8 @@ class _GroupInState:
                 self._straight_outdoors -= replaced_through(light.reflected, parts, visible)
         group = matrices.scene.groups[g]
         sky = ReinhartSky(matrices.sampling.subdivision).directions
-        self._to_sky = angles.towards(group, sky)  # [M, P]
+        self._to_sky = angles.towards(group, sky)  # [M, P]; of the ground, the first, see `_ground_seen`
+        self._ground = _ground_seen(light, coefficients, parts)
         each = range(len(angles.angles))
         self._to_sun = np.array([angles.towards(group, light.sky.direction, n) for n in each])  # [1 + n, M, L]
 
@@ -461,6 +462,7 @@ class _GroupInState:
             # what comes off the outdoors meets the window from anywhere
             direct = straight.values.values if straight.direct is None else straight.direct
             scaled = direct * self._to_sky[m]
+            scaled[:, :1] = direct[:, :1] * (self._ground @ of.straight[m])
             whole = whole + scaled + (straight.values.values - direct) * seen
             if by_sun is not None and straight.direct is not None:
                 by_sun = by_sun + scaled
@@ -514,5 +516,18 @@ def _outdoors_seen(light: PhaseLight, group: GroupCoefficients, parts: NDArray[n
         for q in parts:
             reflected = np.maximum(matrices.daylight.values[q] - direct[q], 0.0).sum(axis=1)
             seen += direct_view[:, q] * group.beam * reflected
+    return _of_total(seen)[:, None]
+
+
+def _ground_seen(light: PhaseLight, group: GroupCoefficients, parts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Shares [S, 1, K] of the patches of incidence in what sensors see of the ground, one patch with no direction."""
+    matrices = light.matrices
+    view = sensor_matrix(matrices).values if matrices.direct_sensors is None else matrices.direct_sensors
+    daylight = matrices.daylight.values if matrices.direct_daylight is None else matrices.direct_daylight
+    return _of_total(np.sum([view[:, q] * group.beam * daylight[q, :, 0] for q in parts], axis=0))[:, None]
+
+
+def _of_total(seen: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Each row's values over its sum [S, K]; 0 where there is nothing."""
     total = seen.sum(axis=1, keepdims=True)
-    return np.divide(seen, total, out=np.zeros_like(seen), where=total > 0)[:, None]
+    return np.divide(seen, total, out=np.zeros_like(seen), where=total > 0)
