@@ -46,7 +46,7 @@ from mitsuba_cfs.methods.coefficients import (
 )
 from mitsuba_cfs.methods.coloured_room import RoomInBand, rooms_in_bands
 from mitsuba_cfs.methods.light import SeasonalLight, seasons_of
-from mitsuba_cfs.methods.optics import SystemOptics, combinations
+from mitsuba_cfs.methods.optics import States, SystemOptics, combinations, neighbours
 from mitsuba_cfs.methods.phase_light import (
     PhaseLight,
     SensorLight,
@@ -172,9 +172,11 @@ def spectral_light(
             raise ValueError("path tracing has no matrices: expected the light of a phase method")
         water = np.broadcast_to(np.asarray(water_cm, dtype=float), (hours_of_all,))[hours]
         skies = sky_spectra(phase.sky, water, clear, ground=ground)
-        season = _Season(with_sensor_light(phase), factors, channels, skies, reflectance)
-        outdoors += season.sky.horizontal.sum(axis=0)
         rows = states_of(phase, None if state is None else state[:, hours])
+        season = _Season(
+            with_sensor_light(phase), _occurring(factors, phase.systems, rows), channels, skies, reflectance
+        )
+        outdoors += season.sky.horizontal.sum(axis=0)
         for kind, some in combinations(rows):
             modes = season.modes_in(kind, some)
             for one, whole in zip(wanted, received, strict=True):
@@ -185,6 +187,21 @@ def spectral_light(
                     whole[..., hours[some]] = values
         progress("spectral", (i + 1) / len(parts))
     return SpectralLight(tuple(received), outdoors)
+
+
+def _occurring(factors: Factors, systems: Sequence[States], rows: NDArray[np.int64]) -> Factors:
+    """The factors of the states that occur in hours [G, L]; a state that does not has that of one that does.
+
+    Each factor more is modes more, in each of which all light is computed.
+    """
+    found = []
+    for of, states, row in zip(factors, systems, rows, strict=True):
+        used = set(np.unique(row).tolist())
+        for j in tuple(used):
+            used |= set((neighbours(states, j) or ())[:2])
+        other = replace(of[min(used, default=0)], slats=None)
+        found.append([one if j in used else other for j, one in enumerate(of)])
+    return found
 
 
 def sky_spectra(
@@ -426,7 +443,8 @@ class _GroupInState:
                 self._straight_outdoors -= replaced_through(light.reflected, parts, visible)
         group = matrices.scene.groups[g]
         sky = ReinhartSky(matrices.sampling.subdivision).directions
-        self._to_sky = angles.towards(group, sky)  # [M, P]
+        self._to_sky = angles.towards(group, sky)  # [M, P]; of the ground, the first, see `_ground_seen`
+        self._ground = _ground_seen(light, coefficients, parts)
         each = range(len(angles.angles))
         self._to_sun = np.array([angles.towards(group, light.sky.direction, n) for n in each])  # [1 + n, M, L]
 
@@ -444,6 +462,7 @@ class _GroupInState:
             # what comes off the outdoors meets the window from anywhere
             direct = straight.values.values if straight.direct is None else straight.direct
             scaled = direct * self._to_sky[m]
+            scaled[:, :1] = direct[:, :1] * (self._ground @ of.straight[m])
             whole = whole + scaled + (straight.values.values - direct) * seen
             if by_sun is not None and straight.direct is not None:
                 by_sun = by_sun + scaled
@@ -497,5 +516,18 @@ def _outdoors_seen(light: PhaseLight, group: GroupCoefficients, parts: NDArray[n
         for q in parts:
             reflected = np.maximum(matrices.daylight.values[q] - direct[q], 0.0).sum(axis=1)
             seen += direct_view[:, q] * group.beam * reflected
+    return _of_total(seen)[:, None]
+
+
+def _ground_seen(light: PhaseLight, group: GroupCoefficients, parts: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Shares [S, 1, K] of the patches of incidence in what sensors see of the ground, one patch with no direction."""
+    matrices = light.matrices
+    view = sensor_matrix(matrices).values if matrices.direct_sensors is None else matrices.direct_sensors
+    daylight = matrices.daylight.values if matrices.direct_daylight is None else matrices.direct_daylight
+    return _of_total(np.sum([view[:, q] * group.beam * daylight[q, :, 0] for q in parts], axis=0))[:, None]
+
+
+def _of_total(seen: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Each row's values over its sum [S, K]; 0 where there is nothing."""
     total = seen.sum(axis=1, keepdims=True)
-    return np.divide(seen, total, out=np.zeros_like(seen), where=total > 0)[:, None]
+    return np.divide(seen, total, out=np.zeros_like(seen), where=total > 0)

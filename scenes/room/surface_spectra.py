@@ -78,13 +78,17 @@ def ground_reflectance(tables: Sequence[SurfaceTable]) -> FloatArray | None:
 
 
 def in_stated_colours(space: Space, tables: Sequence[SurfaceTable]) -> Space:
-    """The room whose surfaces and furniture have the hues under D65 of the tables that select them."""
-    hues = [_hue(table.shape()) for table in tables]
+    """The room whose surfaces and furniture have the hues under D65 of the tables that select them.
+
+    Of bright surfaces those that `room_reflectance` has, as pale as light by wavelength.
+    """
+    shapes = [(table, table.shape()) for table in tables if table.select != GROUND]
 
     def coloured(part: Part) -> Part:
-        found = (hue for table, hue in zip(tables, hues, strict=True) if table.select != GROUND and table.selects(part))
-        hue = next(found, None)
-        return part if hue is None else replace(part, hue=hue)
+        shape = next((shape for table, shape in shapes if table.selects(part)), None)
+        if shape is None:
+            return part
+        return replace(part, hue=_hue(with_visible(shape, part.reflectance("visible"))))
 
     faces, furniture = tuple(map(coloured, space.faces)), tuple(map(coloured, space.furniture))
     return replace(space, faces=faces, furniture=furniture)

@@ -22,7 +22,7 @@ from scenes.result_folder import ResultFolder
 from scenes.results import GlareResults, LuminancePicture
 from scenes.room import glare
 from scenes.room.glare import brightest_picture, with_colour
-from scenes.room.surface_spectra import SurfaceTable, in_stated_colours
+from scenes.room.surface_spectra import SurfaceTable, in_stated_colours, room_reflectance
 from scenes.room.windows import in_all_windows, room_windows
 from scenes.run.outputs import write_results
 from tests.report.synthetic import run_result
@@ -92,10 +92,22 @@ def test_stated_colours_of_surfaces_are_in_the_picture(variant, weather, glass) 
 def test_a_stated_colour_is_the_hue_of_its_surfaces_alone() -> None:
     tables = SurfaceTable(select="wall", colour="#b04a3a"), SurfaceTable(select="ground", colour="#00ff00")
     red = hue_of([((v / 255 + 0.055) / 1.055) ** 2.4 for v in (0xB0, 0x4A, 0x3A)])
-    for before, after in zip(ROOM.faces, in_stated_colours(ROOM, tables).faces, strict=True):
+    dark = replace(ROOM, faces=tuple(replace(face, reflectance_visible=0.14) for face in ROOM.faces))
+    for before, after in zip(dark.faces, in_stated_colours(dark, tables).faces, strict=True):
         # the smooth spectrum of the colour ends at 380 and 780 nm
         assert after.hue == (pytest.approx(red, rel=0.02) if before.kind == "wall" else before.hue)
         assert after.reflectance("visible") == before.reflectance("visible")
+
+
+def test_a_bright_surface_has_the_paler_hue_of_its_light_by_wavelength() -> None:
+    tables = (SurfaceTable(select="wall", colour="#b04a3a"),)
+    bright = replace(ROOM, faces=tuple(replace(face, reflectance_visible=0.8) for face in ROOM.faces))
+    spectra, _ = room_reflectance(bright, tables)
+    assert spectra is not None and spectra.max() == pytest.approx(1.0)
+    for face, spectrum in zip(in_stated_colours(bright, tables).faces, spectra, strict=False):
+        if face.kind == "wall":
+            blue, red = spectrum[70], spectrum[270]  # 450 and 650 nm
+            assert 0.9 * blue < 0.8 * face.hue[2] < 1.1 * blue and 0.9 * red < 0.8 * face.hue[0] < 1.1 * red
 
 
 def test_the_hours_shading_state_holds(variant, weather, glass, milk) -> None:

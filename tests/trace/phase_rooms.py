@@ -39,12 +39,12 @@ def diffuser(tau: float):
     return MatrixOptics(block * OMEGA, KlemsScattering(KLEMS_FULL, block, np.zeros(K)))
 
 
-def traced(interior, exterior, groups, points, **sampling):
-    """The matrices of a room, none of them traced yet."""
+def traced(interior, exterior, groups, points, normals=None, **sampling):
+    """The matrices of a room, none of them traced yet; sensors look up by default."""
     from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 
-    up = np.tile([0.0, 0.0, 1.0], (len(points), 1))
-    scene = DaylightScene(interior, exterior, groups, points, up)
+    normals = np.tile([0.0, 0.0, 1.0], (len(points), 1)) if normals is None else normals
+    scene = DaylightScene(interior, exterior, groups, points, normals)
     return phase_matrices(scene, Sampling(patch_samples=4096, **sampling))
 
 

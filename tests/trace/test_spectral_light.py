@@ -102,6 +102,17 @@ def test_light_is_that_traced_for_each_channel(corner, open_site: bool, most: fl
     assert own[:, : len(points)] == pytest.approx(true, rel=most)
 
 
+def test_light_of_the_ground_passes_the_panes_at_its_own_angles(corner) -> None:
+    # the ground is one patch, whose direction is down: at 90 degrees the panes are darkest and bluest
+    room, groups, _, _ = corner
+    points, normals = np.array([[2.0, 1.5, 1.6], [2.0, 1.5, 2.0]]), np.array([[0.0, -1.0, 0.0], [0.0, -0.6, -0.8]])
+    matrices = traced(room, Surfaces.none(), groups, points, normals, subdivision=1, window_parts=1)
+    factor, whole = tinted(), sky()
+    visible = phase_light(matrices, [[optics(factor.visible)]] * len(groups), whole)
+    own = channel_irradiance(visible, [[factor]] * len(groups), CHANNELS)
+    assert own[:, : len(points)] == pytest.approx(traced_by_channel(matrices, factor, whole), rel=3e-3)
+
+
 def test_neutral_glass_gives_the_photopic_light(corner) -> None:
     room, groups, shade, points = corner
     matrices = traced(room, shade, groups, points, subdivision=1, window_parts=1)

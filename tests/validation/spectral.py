@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import pairwise
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -58,8 +57,9 @@ SKY_AND_GROUND = (
     "skyfunc glow ground_glow 0 0 4 1 1 1 0 ground_glow source ground 0 0 4 0 0 -1 180\n"
 )
 ALTITUDE, AZIMUTH = 35.0, 170.0  # of the sun [degrees], from north by east
-BANDS = 20  # of each run of the peer, whose build has at most 24
-RANGES = 4  # of 100 nm each, a run of the peer for each; 1 is enough where no pane is coloured
+BANDS = 20  # of the peer's single run, which is enough where no pane is coloured
+RANGES = 4  # runs of the peer for 20 bands of 5 nm each
+MOST_BANDS = 24  # of a run of the peer's build: the others are bands that neighbours share
 GAP = 1e-4  # between panes [m]: what leaves a wider one past its rim has met the inner panes alone
 # Diffuse reflectances of the room's faces that are not neutral
 ROOMS: dict[str, dict[str, NDArray[np.float64]]] = {
@@ -237,7 +237,7 @@ def received(light: PhaseLight, window: Window, channels: Channels, reflectance:
     """The light of the points by some bands."""
     wanted = [Detection(channels.detection)]
     [values] = spectral_light(light, [[window.factor]], channels, wanted, reflectance=reflectance).received
-    return Light.of(values[..., 0].T)
+    return Light.of(values[..., 0].T.astype(np.float64))
 
 
 def photopic_light(window: Window, sky: AnnualSky, scene: DaylightScene) -> PhaseLight:
@@ -264,24 +264,44 @@ def radiances(
 
     Of the points, repeat after repeat, whose random numbers differ.
     """
-    power = []  # in the bands of the ranges, from blue to red
+    runs = []  # in the bands of the ranges, from blue to red
     with TemporaryDirectory() as name:
         folder = Path(name)
         lines = "".join(" ".join(f"{v:g}" for v in (*p, *n)) + "\n" for p, n in zip(POINTS, NORMALS, strict=True))
         lines *= repeats
-        options = f"{peer_options(bounces, divisions)} -cs {BANDS} -co+"
-        for low, high in ranges(parts):
+        for first, last in ranges(parts):
+            low, high = edges(parts)[[first, last]]
             peer_scene(folder, window, kind, room, (low, high))
+            options = f"{peer_options(bounces, divisions)} -cs {last - first} -co+"
             command = f"rtrace {options} -cw {low:g} {high:g} scene.oct"
             text = run(command, folder, lines.encode()).decode()
             values = np.array([[float(v) for v in line.split()] for line in text.splitlines()])
-            if values[0].size != BANDS:
+            if values[0].size != last - first:
                 raise ValueError(f"rtrace gave {values[0].size} values a point")
-            power.append(values[:, ::-1] * 400.0 / parts / BANDS)
+            runs.append(values[:, ::-1] * 400.0 / parts / BANDS)
     # a spectrum of 1 has 179 lm/W in Radiance
     flat = detected(np.ones(len(NANOMETRES)))[0]
-    channels = Channels(tuple(np.linspace(380.0, 780.0, parts * BANDS + 1).tolist()))
-    return Light.of(np.concatenate(power, axis=1) @ channels.detection.T * 179.0 / flat)
+    channels = Channels(tuple(edges(parts).tolist()))
+    return Light.of(joined(runs, ranges(parts)) @ channels.detection.T * 179.0 / flat)
+
+
+def joined(runs: Sequence[NDArray[np.float64]], places: Sequence[tuple[int, int]]) -> NDArray[np.float64]:
+    """One spectrum [n, bands] of runs, whose random numbers differ, scaled to each other by the bands they share.
+
+    Its sum is that of the runs as they are, each up to the middle of what it shares.
+    """
+    scale = np.ones(len(runs[0]))
+    raw, scaled, begin = [], [], 0
+    for k, (values, (first, last)) in enumerate(zip(runs, places, strict=True)):
+        end = (last + places[k + 1][0]) // 2 if k + 1 < len(runs) else last
+        if k:
+            before, shared = runs[k - 1], places[k - 1][1] - first
+            scale = scale * before[:, -shared:].sum(axis=1) / values[:, :shared].sum(axis=1)
+        raw.append(values[:, begin - first : end - first])
+        scaled.append(raw[-1] * scale[:, None])
+        begin = end
+    whole = np.concatenate(scaled, axis=1)
+    return np.asarray(whole * (sum(part.sum(axis=1) for part in raw) / whole.sum(axis=1))[:, None])
 
 
 def peer_options(bounces: int, divisions: int) -> str:
@@ -289,10 +309,17 @@ def peer_options(bounces: int, divisions: int) -> str:
     return f"-u+ -I+ -h -ab {bounces} -aa 0 -ad {divisions} -as 0 -lr -{3 * bounces} -lw 1e-7 -dj 0 -dc 1 -dt 0"
 
 
-def ranges(parts: int = RANGES) -> list[tuple[float, float]]:
-    """Ends of the peer's ranges of wavelength [nm]."""
-    ends = np.linspace(380.0, 780.0, parts + 1).tolist()
-    return list(pairwise(ends))
+def edges(parts: int = RANGES) -> NDArray[np.float64]:
+    """Of the peer's bands [nm]."""
+    return np.linspace(380.0, 780.0, parts * BANDS + 1)
+
+
+def ranges(parts: int = RANGES) -> list[tuple[int, int]]:
+    """Bands from and to of the peer's runs."""
+    if parts == 1:
+        return [(0, BANDS)]
+    starts = np.linspace(0, parts * BANDS - MOST_BANDS, parts).round().astype(int).tolist()
+    return [(first, first + MOST_BANDS) for first in starts]
 
 
 def peer_scene(folder: Path, window: Window, kind: str, room: str, nm: tuple[float, float], gap: float = GAP) -> None:

@@ -20,6 +20,8 @@ from tests.validation.spectral import (
     POINTS,
     Light,
     Window,
+    edges,
+    joined,
     peer_scene,
     ranges,
     room_scene,
@@ -64,10 +66,11 @@ def _lights(window: Window, divisions: int, gap: float) -> tuple[Light, Light, L
     seen, bare, sampled = [], [], []
     with TemporaryDirectory() as name:
         folder = Path(name)
-        for low, high in ranges():
+        for first, last in ranges():
+            low, high = edges()[[first, last]]
             peer_scene(folder, window, "overcast", "neutral", (low, high), gap)
             run("oconv sky.rad room.rad > bare.oct", folder)
-            options = f"-h -dj 0 -dt 0 -cs 20 -co+ -cw {low:g} {high:g}"
+            options = f"-h -dj 0 -dt 0 -cs {last - first} -co+ -cw {low:g} {high:g}"
             rays = _lines(starts, directions.reshape(-1, 3))
             seen.append(_values(f"rtrace -ab 0 -lw 0 -lr 8 {options} scene.oct", folder, rays))
             bare.append(_values(f"rtrace -ab 0 {options} bare.oct", folder, rays))
@@ -75,10 +78,10 @@ def _lights(window: Window, divisions: int, gap: float) -> tuple[Light, Light, L
             sampled.append(_values(f"rtrace {sampling} {options} scene.oct", folder, _lines(POINTS, NORMALS)))
     angle = np.arccos(np.abs(directions.reshape(-1, 3)[:, 1]))
     through = np.stack([np.interp(angle, ANGLES, row) for row in EVERY_5_NM.mean(window.factor.transmittance).T], 1)
-    of_cells = [np.concatenate(part, axis=1) for part in (seen, bare)]
+    of_cells = [joined(part, ranges()) for part in (seen, bare)]
     whole = [of_cells[0], of_cells[1] * through]
     rays, own = (np.einsum("sc,scn->sn", weights, v.reshape(len(POINTS), CELLS**2, -1)) for v in whole)
-    return _light(rays), _light(np.concatenate(sampled, axis=1)), _light(own)
+    return _light(rays), _light(joined(sampled, ranges())), _light(own)
 
 
 def _cells() -> tuple[NDArray[np.float64], NDArray[np.float64]]:
