@@ -210,3 +210,13 @@ def test_unlike_bases_and_odd_counts_can_be_reversed():
     filled = KlemsBsdf(basis, KLEMS_QUARTER, transmission_front=block).filled()
     assert filled.transmission_back.shape == (41, 6)
     assert filled.transmission_back.min() >= 0.1
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.0009, False), (0.0011, True)])
+def test_a_back_that_transmits_less_than_a_thousandth_is_a_placeholder(share, kept):
+    """The threshold below which Radiance drops a component."""
+    front = np.full((41, 41), 0.1)
+    back = np.full((41, 41), share / np.pi)
+    filled = KlemsBsdf(KLEMS_QUARTER, KLEMS_QUARTER, transmission_front=front, transmission_back=back).filled()
+    assert filled.transmission_back is not None
+    np.testing.assert_allclose(filled.transmission_back, back if kept else front)
