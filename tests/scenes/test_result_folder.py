@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import TEMPORARY, check_file, remove_stale, replacing, write_text
+from mitsuba_cfs.files import TEMPORARY, check_file, remove_stale, replacing, temporary_folder, write_text
 from scenes.result_folder import CASES, MARK, FolderMark, ResultFolder, remove_results
 from tests.conftest import REPOSITORY
 
@@ -256,10 +256,9 @@ def test_an_input_inside_is_refused_but_for_a_folder_that_is_added_to(tmp_path):
     ResultFolder(out, "test", inputs=[tmp_path / "model.ifc"])
 
 
-def test_files_of_others_are_found_beside_what_a_killed_process_left(tmp_path):
-    (tmp_path / ".cfs-01234567.part").mkdir()
+def test_files_of_others_are_found_beside_a_temporary_of_another_process(tmp_path):
     (tmp_path / "mine").touch()
-    with pytest.raises(DataError, match="holds other files"):
+    with temporary_folder(tmp_path), pytest.raises(DataError, match="holds other files"):
         ResultFolder(tmp_path, "test")
     ResultFolder(tmp_path, "test", among=True)
 
