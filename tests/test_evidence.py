@@ -129,5 +129,5 @@ def unknown_tests(page: str) -> list[str]:
 def test_each_fault_has_its_test():
     page = (DOCS / "reliability.md").read_text("utf-8")
     assert not unknown_tests(page)
-    assert len(unknown_tests(page.replace("::test_a_full_disk", "::test_a_fuller_disk"))) == 1
+    assert len(unknown_tests(page.replace("::test_a_read_only_disk", "::test_a_written_disk"))) == 1
     assert len(unknown_tests(page.replace("`tests/test_processes.py`", "-"))) > 0
