@@ -178,3 +178,14 @@ def test_weights_and_limits_that_cannot_be() -> None:
         with pytest.raises(ValueError, match=words):
             daylight_autonomy(np.array(lux), np.array(hours))
     assert daylight_autonomy(np.array([[300]]), one[1]) == 1.0  # whole numbers
+
+
+def test_the_noise_of_two_hours_alone_is_that_of_a_mean_hour() -> None:
+    """By the formula, without anything in common: n / (2 a H^2) sqrt(v / pi) of n = H = 2."""
+    lux, hours = np.array([[285.0], [312.0]]), np.ones(2, dtype=bool)
+    noise = daylight_autonomy_noise(
+        lux, hours, lambda weights: own((0.02**2 * (weights * lux) ** 2).sum(axis=0)), relative_error=np.zeros(1)
+    )
+    v = np.mean((0.02 * lux / 300) ** 2)
+    assert noise.own[0] == pytest.approx(2 / (2 * 0.05 * 2**2) * np.sqrt(v / np.pi))
+    assert noise.shared[0] == 0
