@@ -469,3 +469,24 @@ def test_each_line_of_the_head_of_a_wea_is_asked_for(tmp_path, year, line):
         with pytest.raises(DataError, match="expected the header") as caught:
             read_wea(path)
         assert caught.value.element == f"line {line + 1}"
+
+
+@pytest.mark.parametrize(
+    ("latitude", "longitude", "good"),
+    [(90, 180, True), (-90, -180, True), (90.5, 0, False), (-90.5, 0, False), (0, 180.5, False), (0, -180.5, False)],
+)
+def test_a_weather_is_of_a_place_on_earth(chicago, latitude, longitude, good):
+    changes = {"latitude_deg": latitude, "longitude_deg": longitude}
+    if good:
+        assert replace(read_epw(chicago), **changes).latitude_deg == latitude
+    else:
+        with pytest.raises(ValueError, match="expected latitude"):
+            replace(read_epw(chicago), **changes)
+
+
+def test_days_of_the_week_count_from_the_files_first(chicago):
+    """January 1 of the file's own weekday; January 8 is the same."""
+    for first in range(7):
+        weekday = replace(read_epw(chicago), first_weekday=first).weekday
+        assert weekday[:24].tolist() == [first] * 24
+        assert weekday[24] == (first + 1) % 7 and weekday[7 * 24] == first
