@@ -291,3 +291,11 @@ def test_a_key_is_set_down_a_path(path, made, result) -> None:
 def test_a_key_of_an_empty_list_cannot_be_set() -> None:
     with pytest.raises(DataError, match="there is no entry to set 'x' in"):
         toml_file.set_key({"empty": []}, ["empty", "x"], 9, made=True)
+
+
+def test_texts_that_name_files_of_the_folder_become_their_paths(tmp_path) -> None:
+    (tmp_path / "a.epw").touch()
+    table = {"weather": "a.epw", "rows": [{"bsdf": "b.xml"}, "a.epw"], "title": "", "number": 3}
+    path = str(tmp_path / "a.epw")
+    found = toml_file.with_absolute_files(table, tmp_path)
+    assert found == {"weather": path, "rows": [{"bsdf": "b.xml"}, path], "title": "", "number": 3}

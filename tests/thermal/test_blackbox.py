@@ -235,3 +235,12 @@ def test_what_a_stated_g_has_more_moves_from_the_outer_node_first(more):
     assert plain.outer - moved.outer == pytest.approx(more / (0.8 - 0.1))
     assert moved.inner - plain.inner == pytest.approx(more / (0.8 - 0.1))
     assert moved.middle == pytest.approx(plain.middle)
+
+
+@pytest.mark.parametrize("less", [0.01, 0.05])
+def test_what_a_stated_g_has_less_moves_from_the_inner_node_first(less):
+    sun = np.array([[0.1, 0.05, 0.2, 0.3]])
+    plain, moved = (node_absorptances(sun, SHADE, one) for one in (0.0, -less))
+    assert moved.outer - plain.outer == pytest.approx(less / (0.8 - 0.1))
+    assert plain.inner - moved.inner == pytest.approx(less / (0.8 - 0.1))
+    assert moved.middle == pytest.approx(plain.middle)
