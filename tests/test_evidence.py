@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from tests.conftest import REPOSITORY
@@ -103,3 +105,29 @@ def test_modules_in_which_faults_are_planted_are_there():
     for module, tests in mutants.MODULES.items():
         assert (REPOSITORY / f"{module}.py").is_file(), module
         assert all((REPOSITORY / "tests" / f"{one}.py").is_file() for one in tests), module
+
+
+def unknown_tests(page: str) -> list[str]:
+    """Rows of a page of faults whose last cell names no test, or one that is not there."""
+    rows, file = [], ""
+    for row in page.splitlines():
+        if not row.startswith("| ") or row.startswith("| fault |"):
+            continue
+        cell = re.split(r"(?<!\\)\|", row)[-2].strip()
+        names = re.findall(r"`([^`]+)`", cell)
+        if not names and not (file and cell.startswith("the same")):
+            rows.append(row)
+        for name in names:
+            file, function = name.partition("::")[0] or file, name.partition("::")[2]
+            path = REPOSITORY / file
+            pattern = re.escape(function).replace(re.escape("..."), r"\w*") if function else "test_"
+            if not path.is_file() or not re.search(rf"^def {pattern}", path.read_text("utf-8"), re.MULTILINE):
+                rows.append(row)
+    return rows
+
+
+def test_each_fault_has_its_test():
+    page = (DOCS / "reliability.md").read_text("utf-8")
+    assert not unknown_tests(page)
+    assert len(unknown_tests(page.replace("::test_a_read_only_disk", "::test_a_written_disk"))) == 1
+    assert len(unknown_tests(page.replace("`tests/test_processes.py`", "-"))) > 0

@@ -13,6 +13,7 @@ The page changes only what it shows; keys and entries of others in these files s
 from __future__ import annotations
 
 import json
+import os
 import re
 import threading
 import unicodedata
@@ -511,8 +512,12 @@ class Project:
 
     def record(self, line: Mapping[str, Any]) -> None:
         """Append a line to the journal of commands."""
-        with (self.folder / JOURNAL).open("a", encoding="utf-8") as file:
-            file.write(json_text(line, ensure_ascii=False) + "\n")
+        with (self.folder / JOURNAL).open("ab+") as file:
+            if file.tell():
+                file.seek(-1, os.SEEK_END)
+                if file.read(1) != b"\n":  # a line that a full disk has cut
+                    file.write(b"\n")
+            file.write(json_text(line, ensure_ascii=False).encode() + b"\n")
 
     def journal(self) -> list[dict[str, Any]]:
         """The commands that were run, the latest last; lines that are none are left out."""

@@ -456,8 +456,11 @@ class AppServer:
 
         for source in (OFFICE, WEATHER):
             part = self._project.folder / INPUTS / f".upload-{secrets.token_hex(8)}"
-            await asyncio.to_thread(shutil.copyfile, source, part)
-            await asyncio.to_thread(self._project.take, part, Path(source).name)
+            try:
+                await asyncio.to_thread(shutil.copyfile, source, part)
+                await asyncio.to_thread(self._project.take, part, Path(source).name)
+            finally:
+                part.unlink(missing_ok=True)
         self._jobs.add([actions.check(self._project)])
         return self._facts()
 

@@ -127,3 +127,13 @@ def test_a_fault_at_the_end_of_a_command_lets_the_next_one_run(project, jobs, fa
     jobs.again(1)
     until(lambda: not jobs.busy)
     assert jobs.facts()[1]["state"] == "done"
+
+
+def test_a_line_that_a_full_disk_has_cut_takes_no_other_with_it(project) -> None:
+    line = {"command": ["cfs", "check"]}
+    project.record(line)
+    with (project.folder / "commands.jsonl").open("a") as file:
+        file.write('{"command": ["cf')
+    project.record(line)
+    project.record(line)
+    assert project.journal() == [line] * 3

@@ -9,6 +9,7 @@ import pytest
 from scenes.app.server import UploadLimits
 from scenes.demo import OFFICE, VENETIAN_BLIND
 from tests.app.served import serving
+from tests.conftest import fill
 
 GLAZING = VENETIAN_BLIND.with_name("glazing.xml")
 
@@ -155,4 +156,23 @@ def test_limits_of_size_and_number(tmp_path) -> None:
         status, answer = served.upload(OFFICE, "other.ifc")
         assert status == 422 and "at most 2 input files" in answer["error"]
         assert len(list((served.project.folder / "inputs").iterdir())) == 2
+        served.jobs.close()
+
+
+def test_a_full_disk_is_one_line_and_keeps_the_project(small_disk) -> None:
+    with serving(small_disk / "project") as served:
+        assert served.page("POST", "/api/change", {"title": "before"})[0] == 200
+        folder = served.project.folder
+        before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+        fill(small_disk)
+        for answer in (
+            served.page("POST", "/api/change", {"title": "after"}),
+            served.upload(GLAZING),
+            served.page("POST", "/api/demo", {}),
+        ):
+            assert answer[0] == 422 and "the disk is full" in answer[1]["error"], answer
+            assert ".upload" not in answer[1]["error"] and ".part" not in answer[1]["error"]
+        assert {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()} == before
+        (small_disk / "filler").unlink()
+        assert served.upload(GLAZING)[0] == 200
         served.jobs.close()

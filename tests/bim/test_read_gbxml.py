@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bim.building_file import read_building_file
+from bim.defaults import FACADE_REFLECTANCE
 from bim.gbxml import document
 from bim.gbxml.building import Constructions, _is_slab, read_gbxml
 from bim.gbxml.document import read_document
@@ -492,3 +493,40 @@ def test_a_material_of_a_resistance_and_a_thickness_has_both(tmp_path):
     south = next(f for f in read_gbxml(path).spaces[0].faces if f.name == "Office-south")
     brick, wool = south.construction.layers
     assert (brick.thickness, brick.resistance, wool.resistance) == pytest.approx((0.2, 2.5, 3.0))
+
+
+def test_the_volume_that_a_space_states_is_kept(tmp_path):
+    building = changed(tmp_path, ("<Area>40</Area>", "<Area>40</Area><Volume>125</Volume>"))
+    assert [space.stated_volume for space in building.spaces] == [125.0, None]
+
+
+def test_a_shade_has_the_outer_reflectance_of_its_construction(tmp_path, building):
+    """Else that of facades."""
+    finished = changed(tmp_path, ('surfaceType="Shade"', 'surfaceType="Shade" constructionIdRef="wall"'))
+    values = [
+        one.reflectance_visible
+        for model in (building, finished)
+        for one in model.elements
+        if one.ifc_class == "IfcShadingDevice"
+    ]
+    assert values == [FACADE_REFLECTANCE, 0.25]
+
+
+@pytest.mark.parametrize(
+    ("opening", "doors"),
+    [
+        ('openingType="NonSlidingDoor" windowTypeIdRef="missing"', 2),
+        ('openingType="NonSlidingDoor" windowTypeIdRef="unit"', 0),
+        ('openingType="Hatch"', 2),
+        ('openingType="Hatch" windowTypeIdRef="missing"', 0),
+    ],
+)
+def test_a_door_is_glass_only_by_a_type_of_window_that_there_is(tmp_path, opening, doors):
+    """An opening of an unknown type is glass if it names any."""
+    building = changed(tmp_path, ('openingType="NonSlidingDoor"', opening))
+    assert sum(face.kind == "door" for space in building.spaces for face in space.faces) == doors
+
+
+def test_an_area_of_nought_states_nothing(tmp_path):
+    building = changed(tmp_path, ("<Area>40</Area>", "<Area>0</Area>"))
+    assert building.spaces[0].stated_area is None and not of_code(building, "value-not-read")

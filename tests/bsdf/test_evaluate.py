@@ -9,6 +9,7 @@ from mitsuba_cfs.bsdf.evaluate import (
     BLOCKS,
     ThroughPeak,
     _block,
+    _leaves_ahead,
     _peak,
     bsdf_values,
     direct_hemispherical,
@@ -21,7 +22,7 @@ from mitsuba_cfs.bsdf.evaluate import (
 )
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_HALF, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_merge import merged_tree
-from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf, morton
+from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf, morton, square_to_disk
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from scenes.demo import VENETIAN_BLIND
 
@@ -178,3 +179,38 @@ def test_what_is_around_a_peak_is_a_mean_over_its_solid_angle() -> None:
     peak, around = _peak(value, depth, 6)
     assert peak.tolist() == [[True, False, False, False]]
     assert around == pytest.approx([(4 * 5.0 + 1.0) / 5])
+
+
+def test_directions_of_every_block_may_be_in_one_call() -> None:
+    bsdf = read_bsdf_xml(VENETIAN_BLIND).band("Visible")
+    up = np.random.default_rng(5).normal(size=(2, 40, 3))
+    incident, outgoing = up / np.linalg.norm(up, axis=-1, keepdims=True)
+    together = bsdf_values(bsdf, incident, outgoing)
+    alone = [bsdf_values(bsdf, one, other)[0] for one, other in zip(incident, outgoing, strict=True)]
+    np.testing.assert_array_equal(together, alone)
+    sides = 2 * (incident[:, 2] > 0) + (outgoing[:, 2] > 0)
+    assert all((together[sides == side] > 0).any() for side in range(4))
+
+
+def test_leaves_that_are_looked_at_for_a_beam_lie_round_straight_on() -> None:
+    """Within 2.4 widths of the smallest leaf, to each side; straight on is one of them."""
+    depth = 5
+    cells = 1 << depth
+    grid = np.indices((cells,) * 4)
+    order = np.argsort(morton(np.stack(grid, -1), depth).ravel())
+    tree = TensorTree(4, np.full(order.size, depth, dtype=np.int64), np.zeros(order.size))
+    leaves = _leaves_ahead(tree)
+    *incident, out_x, out_y = (axis.ravel()[order] for axis in grid)
+    place = square_to_disk((np.stack([out_x, out_y], -1) + 0.5) / cells)
+    straight = square_to_disk((np.stack(np.unravel_index(np.arange(cells**2), (cells, cells)), -1) + 0.5) / cells)
+    width = np.sqrt(np.pi) / cells
+    off = (place[leaves] - straight[:, None]) / width
+    off[leaves < 0] = 0.0
+    far = np.linalg.norm(off, axis=-1)
+    assert 2.0 < far.max() < 2.4 + 0.8  # a leaf's middle is up to half its diagonal from a place in it
+    assert (far == 0).any(axis=1).all()
+    inner = np.linalg.norm(straight, axis=1) < 0.8
+    for k in (0, 1):
+        assert (off[inner, :, k].max(axis=1) > 1.0).all() and (off[inner, :, k].min(axis=1) < -1.0).all()
+    for number, cell in zip(incident, np.unravel_index(np.arange(cells**2), (cells, cells)), strict=True):
+        assert (number[leaves] == cell[:, None])[leaves >= 0].all()

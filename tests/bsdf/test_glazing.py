@@ -10,6 +10,7 @@ import pytest
 
 from mitsuba_cfs.bsdf.glazing import (
     Pane,
+    _diffuse,
     absorbed_by_layers,
     hemispherical_mean,
     pane_optics,
@@ -182,3 +183,14 @@ def test_panes_and_a_shade_absorb_what_neither_passes_nor_returns():
     np.testing.assert_allclose(shaded.sum(axis=1), 1 - 0.2 * tau - rho)
     with pytest.raises(ValueError, match="at most one shade"):
         absorbed_by_layers([None, outer, None], tau, rho, ANGLES)
+
+
+def test_diffuse_light_passes_a_pane_as_its_mean_over_the_hemisphere():
+    """Against Gauss's rule over the projected area."""
+    pane = Pane("clear", 0.834, 0.075, 0.075)
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    share = 0.5 * (nodes + 1)  # sine squared: its density is that of projected area
+    tau, rho, _ = pane_values(pane, np.arcsin(np.sqrt(share)))
+    passed, absorbed = _diffuse([pane])
+    assert passed == pytest.approx(0.5 * weights @ tau, abs=2e-3)
+    assert absorbed == pytest.approx([0.5 * weights @ (1 - tau - rho)], abs=2e-3)

@@ -210,3 +210,26 @@ def test_unlike_bases_and_odd_counts_can_be_reversed():
     filled = KlemsBsdf(basis, KLEMS_QUARTER, transmission_front=block).filled()
     assert filled.transmission_back.shape == (41, 6)
     assert filled.transmission_back.min() >= 0.1
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.0009, False), (0.0011, True)])
+def test_a_back_that_transmits_less_than_a_thousandth_is_a_placeholder(share, kept):
+    """The threshold below which Radiance drops a component."""
+    front = np.full((41, 41), 0.1)
+    back = np.full((41, 41), share / np.pi)
+    filled = KlemsBsdf(KLEMS_QUARTER, KLEMS_QUARTER, transmission_front=front, transmission_back=back).filled()
+    assert filled.transmission_back is not None
+    np.testing.assert_allclose(filled.transmission_back, back if kept else front)
+
+
+def test_rings_of_the_standard_bases_lie_where_windows_engine_has_them():
+    """Middles [degrees] and patches of each ring. Source: LBNL, Windows-CalcEngine, `BSDFHemisphere`."""
+    for basis, middles, counts in (
+        (KLEMS_FULL, [0, 10, 20, 30, 40, 50, 60, 70, 82.5], [1, 8, 16, 20, 24, 24, 24, 16, 12]),
+        (KLEMS_HALF, [0, 13, 26, 39, 52, 65, 80.75], [1, 8, 12, 16, 20, 12, 8]),
+        (KLEMS_QUARTER, [0, 18, 36, 54, 76.5], [1, 8, 12, 12, 8]),
+    ):
+        theta, _ = basis.centres()
+        np.testing.assert_allclose(np.degrees(theta[basis.ring_starts]), middles, atol=1e-9)
+        assert list(basis.phi_counts) == counts
+        assert np.degrees(basis.theta_bounds[-1]) == pytest.approx(90)

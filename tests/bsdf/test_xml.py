@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_tensor_tree import random_tree
 
-from mitsuba_cfs.bsdf.klems import KLEMS_QUARTER, KlemsBasis, KlemsBsdf
+from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KLEMS_HALF, KLEMS_QUARTER, KlemsBasis, KlemsBsdf
 from mitsuba_cfs.bsdf.tensor_tree import TensorTree, TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import BsdfFile, read_bsdf_xml, write_bsdf_xml
 from mitsuba_cfs.errors import DataError
@@ -217,3 +217,29 @@ def test_a_ring_around_the_normal_of_several_patches_has_its_own_middle(tmp_path
     file = tmp_path / "b.xml"
     write_bsdf_xml(BsdfFile({"Visible": KlemsBsdf(basis, basis, block, block, block, block)}), file)
     assert re.findall("<Theta>(.*?)</Theta>", file.read_text()) == ["15", "60"]
+
+
+@pytest.mark.parametrize(
+    ("basis", "middles"),
+    [
+        (KLEMS_FULL, "0 10 20 30 40 50 60 70 82.5"),
+        (KLEMS_HALF, "0 13 26 39 52 65 80.75"),
+        (KLEMS_QUARTER, "0 18 36 54 76.5"),
+    ],
+)
+def test_rings_have_the_middles_of_windows_engine(basis, middles, tmp_path):
+    """Source: LBNL, Windows-CalcEngine, `BSDFHemisphere`."""
+    file = tmp_path / "a.xml"
+    zero = np.zeros((basis.size, basis.size))
+    write_bsdf_xml(BsdfFile({"Visible": KlemsBsdf(basis, basis, transmission_front=zero)}), file)
+    assert re.findall("<Theta>(.*?)</Theta>", file.read_text()) == middles.split()
+
+
+def test_a_file_of_one_byte_too_many_is_refused(text, tmp_path, monkeypatch):
+    file = tmp_path / "a.xml"
+    file.write_text(text)
+    monkeypatch.setattr("mitsuba_cfs.bsdf.xml.MOST_BYTES", len(text))
+    assert read_bsdf_xml(file).bands
+    monkeypatch.setattr("mitsuba_cfs.bsdf.xml.MOST_BYTES", len(text) - 1)
+    with pytest.raises(DataError, match="is too big"):
+        read_bsdf_xml(file)

@@ -178,3 +178,15 @@ def test_weights_and_limits_that_cannot_be() -> None:
         with pytest.raises(ValueError, match=words):
             daylight_autonomy(np.array(lux), np.array(hours))
     assert daylight_autonomy(np.array([[300]]), one[1]) == 1.0  # whole numbers
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_the_noise_of_few_hours_alone_is_that_of_each(count) -> None:
+    """By the formula, without anything in common: n / (2 a H^2) sqrt(v / pi) of n = H."""
+    lux, hours = np.full((count, 1), 285.0), np.ones(count, dtype=bool)
+    noise = daylight_autonomy_noise(
+        lux, hours, lambda weights: own((0.02**2 * (weights * lux) ** 2).sum(axis=0)), relative_error=np.zeros(1)
+    )
+    v = (0.02 * 285.0 / 300) ** 2
+    assert noise.own[0] == pytest.approx(1 / (2 * 0.05 * count) * np.sqrt(v / np.pi))
+    assert noise.shared[0] == 0

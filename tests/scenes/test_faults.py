@@ -27,7 +27,7 @@ from scenes.result_folder import MARK
 from scenes.study.store import CaseResult
 from scenes.study.study import run_study
 from scenes.study.study_file import read_study
-from tests.conftest import REPOSITORY, default_signals
+from tests.conftest import REPOSITORY, default_signals, fill
 from tests.scenes.quick_work import STOP
 from tests.scenes.study_files import study_file
 from tests.scenes.writing_jobs import JOBS, Job, Place, heavy_ones_slow, refused
@@ -68,17 +68,6 @@ def test_every_option_that_names_an_output_is_in_the_list(tmp_path) -> None:
             if path and not NOT_TRIED & {*option.opts} and name not in EARLIER_NAMES:
                 called = [one.split() for one in words if one.startswith(f"{name} ")]
                 assert any({*option.opts} & {*one} for one in called), f"{name} {option.opts}"
-
-
-def fill(disk: Path) -> None:
-    """Leave no free block."""
-    with open(disk / "filler", "wb", buffering=0) as file:
-        for size in (2**16, 2**10, 1):
-            try:
-                while True:
-                    file.write(bytes(size))
-            except OSError:
-                pass
 
 
 @pytest.mark.parametrize("name", heavy_ones_slow(JOBS))

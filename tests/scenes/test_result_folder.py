@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import TEMPORARY, check_file, remove_stale, replacing, write_text
-from scenes.result_folder import MARK, FolderMark, ResultFolder
+from mitsuba_cfs.files import TEMPORARY, check_file, remove_stale, replacing, temporary_folder, write_text
+from scenes.result_folder import CASES, MARK, FolderMark, ResultFolder, remove_results
 from tests.conftest import REPOSITORY
 
 
@@ -246,3 +246,74 @@ def test_matrices_on_a_full_disk_are_one_error_and_no_bus_error(tmp_path):
     finally:
         subprocess.run(["umount", "-l", str(tmp_path)], check=False)
     assert done.returncode == 1 and "the disk is full" in done.stderr, done
+
+
+def test_an_input_inside_is_refused_but_for_a_folder_that_is_added_to(tmp_path):
+    out = tmp_path / "out"
+    with pytest.raises(DataError, match="is or contains the input"):
+        ResultFolder(out, "test", inputs=[None, out / "model.ifc"])
+    ResultFolder(out, "test", inputs=[out / "model.ifc"], adding=True)
+    ResultFolder(out, "test", inputs=[tmp_path / "model.ifc"])
+
+
+def test_files_of_others_are_found_beside_a_temporary_of_another_process(tmp_path):
+    (tmp_path / "mine").touch()
+    with temporary_folder(tmp_path), pytest.raises(DataError, match="holds other files"):
+        ResultFolder(tmp_path, "test")
+    ResultFolder(tmp_path, "test", among=True)
+
+
+def test_what_is_written_early_stays_until_the_results(tmp_path):
+    out = tmp_path / "out"
+    ResultFolder(out, "test").early({"a": "begun"})
+    assert content(out) == {"a": "begun"}
+    ResultFolder(out, "test").early({"a": "begun again"})
+    assert content(out) == {"a": "begun again"}
+    write(out, a="1", b="1")
+    ResultFolder(out, "test").early({"a": "begun"})  # not over results
+    assert content(out) == {"a": "1", "b": "1"}
+    write(out, a="1")
+    (out / "mine").write_text("mine")
+    with pytest.raises(DataError, match="holds mine, which no earlier run wrote"):
+        ResultFolder(out, "test").early({"a": "begun", "mine": "begun"})
+    assert content(out) == {"a": "1", "mine": "mine"}
+
+
+def test_checkpoints_lie_in_the_folder(tmp_path):
+    cases = ResultFolder(tmp_path / "out", "test").checkpoints(CASES)
+    assert cases == tmp_path / "out" / CASES and cases.is_dir()
+
+
+def test_a_folder_of_results_that_others_have_a_file_for_goes_beside(tmp_path):
+    out = tmp_path / "out"
+    write(out, a="1")
+    (out / "room").write_text("mine")
+    with pytest.raises(DataError, match="holds room/b, which no earlier run wrote; the new results are in results-1"):
+        write(out, **{"room/b": "2"})
+    assert (out / "room").read_text() == "mine" and (out / "a").read_text() == "1"
+    assert (out / "results-1" / "room" / "b").read_text() == "2"
+
+
+def test_folders_that_are_empty_without_earlier_results_go(tmp_path):
+    out = tmp_path / "out"
+    write(out, **{"room/first/a": "1"})
+    (out / "empty").mkdir()
+    write(out, b="2")
+    assert sorted(path.name for path in out.iterdir()) == ["b", MARK, "empty"]
+
+
+def test_results_are_removed_with_their_cases_and_files_of_others_stay(tmp_path):
+    out = tmp_path / "out"
+    write(out, **{"a": "1", "room/b": "1"})
+    (out / CASES).mkdir()
+    (out / CASES / "c.npz").touch()
+    remove_results(out)
+    assert not out.exists()
+    write(out, a="1")
+    (out / "mine").write_text("mine")
+    remove_results(out)
+    assert content(out) == {"mine": "mine"}
+    write(out, a="2")  # its mark is still there
+    assert content(out) == {"a": "2", "mine": "mine"}
+    with pytest.raises(DataError, match="is no folder of results"):
+        remove_results(tmp_path)

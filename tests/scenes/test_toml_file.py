@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 import pytest
-from pydantic import BaseModel
+from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from mitsuba_cfs.errors import DataError
 from scenes import toml_file
@@ -254,3 +254,48 @@ def test_the_type_within_a_list_that_may_be_a_number_is_found() -> None:
 
 def test_what_annotates_a_table_is_passed_over() -> None:
     assert keys_of(Annotated[toml_file.OutdoorTable, "of a study"]) == keys_of(toml_file.OutdoorTable)
+
+
+def test_a_positive_number_is_above_zero() -> None:
+    positive = TypeAdapter(toml_file.Positive)
+    assert positive.validate_python(0.001) == 0.001
+    with pytest.raises(ValidationError):
+        positive.validate_python(0.0)
+
+
+@pytest.mark.parametrize(
+    ("path", "made", "result"),
+    [
+        ("a.b", False, {"a": {"b": 9}, "rows": [{"x": 1}, {"x": 2}], "pair": (1, 2), "none": None}),
+        ("rows.x", False, {"a": {"b": 1}, "rows": [{"x": 9}, {"x": 9}], "pair": (1, 2), "none": None}),
+        ("rows.1.x", False, {"a": {"b": 1}, "rows": [{"x": 1}, {"x": 9}], "pair": (1, 2), "none": None}),
+        ("rows.1", False, {"a": {"b": 1}, "rows": [{"x": 1}, 9], "pair": (1, 2), "none": None}),
+        ("pair.0", False, {"a": {"b": 1}, "rows": [{"x": 1}, {"x": 2}], "pair": [9, 2], "none": None}),
+        ("none.y", True, {"a": {"b": 1}, "rows": [{"x": 1}, {"x": 2}], "pair": (1, 2), "none": {"y": 9}}),
+        ("none.y", False, "no such key; there are a, rows, pair"),
+        ("rows.2.x", False, "there is no entry 2: there are 2"),
+        ("a.b.c", False, "there is no table to set 'c' in, but 1"),
+    ],
+)
+def test_a_key_is_set_down_a_path(path, made, result) -> None:
+    table: dict[str, Any] = {"a": {"b": 1}, "rows": [{"x": 1}, {"x": 2}], "pair": (1, 2), "none": None}
+    if isinstance(result, str):
+        with pytest.raises(DataError) as caught:
+            toml_file.set_key(table, path.split("."), 9, made=made)
+        assert result in str(caught.value)
+    else:
+        toml_file.set_key(table, path.split("."), 9, made=made)
+        assert table == result
+
+
+def test_a_key_of_an_empty_list_cannot_be_set() -> None:
+    with pytest.raises(DataError, match="there is no entry to set 'x' in"):
+        toml_file.set_key({"empty": []}, ["empty", "x"], 9, made=True)
+
+
+def test_texts_that_name_files_of_the_folder_become_their_paths(tmp_path) -> None:
+    (tmp_path / "a.epw").touch()
+    table = {"weather": "a.epw", "rows": [{"bsdf": "b.xml"}, "a.epw"], "title": "", "number": 3}
+    path = str(tmp_path / "a.epw")
+    found = toml_file.with_absolute_files(table, tmp_path)
+    assert found == {"weather": path, "rows": [{"bsdf": "b.xml"}, path], "title": "", "number": 3}

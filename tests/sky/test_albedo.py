@@ -161,3 +161,12 @@ def test_snow_of_half_hours_is_counted_in_hours(weather):
         fine = replace(weather, **series | {"times": ends, "step_h": 0.5, "notes": ()})
         cold = replace(fine, dry_bulb_c=np.full(17520, -1.0), snow_depth_cm=depth)
         assert bool(with_albedo(cold, None).notes) == noted
+
+
+def test_snow_on_a_warm_day_is_not_believed_and_the_note_names_the_weather(weather):
+    assert not with_albedo(replace(snowed(weather, warmest=99.0), notes=()), None).notes
+    cold = replace(snowed(weather), notes=())
+    (note,) = with_albedo(cold, None).notes
+    assert str(note).startswith(f"{WEATHER.name}: snow lies in")
+    (note,) = with_albedo(replace(cold, file=None, site="Chicago"), None).notes
+    assert str(note).startswith("Chicago: snow lies in")

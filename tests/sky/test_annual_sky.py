@@ -99,3 +99,16 @@ def test_a_result_of_the_weather_is_made_once_for_its_arguments(sky):
 
     assert [sky.once(doubled, "weather", number) for number in (3, 3, 4)] == [6, 6, 8]
     assert calls == [3, 4]
+
+
+def test_a_sky_is_of_subdivision_4_and_to_true_north_unless_asked():
+    suns = [[0.0, 0.5, np.sqrt(0.75)]]
+    given = given_sky(suns, [500.0], [100.0], day_of_year=[100.0])
+    assert given.whole.shape == (2306, 1)
+    times = pd.date_range("2023-04-10 12:00", periods=1, freq="1h")
+    year = Weather("site", 40.0, 0.0, 0.0, 0.0, 1.0, times, np.array([500.0]), np.array([100.0]))
+    sky = annual_sky(year)
+    assert sky.whole.shape == (2306, 1)
+    np.testing.assert_array_equal(sky.whole, annual_sky(year, 4, rotation_deg=0.0).whole)
+    turned = annual_sky(year, 4, rotation_deg=0.01).whole
+    assert np.abs(sky.whole - turned).max() > 0

@@ -18,6 +18,7 @@ def test_closed_forms(mf):
     assert sky.size == SIZES[mf] == len(sky.directions) == len(sky.solid_angles)
     assert sky.row_counts.sum() == sky.size - 1
     np.testing.assert_allclose(sky.solid_angles[1:].sum(), 2 * np.pi, rtol=1e-13)
+    assert sky.solid_angles[0] == 2 * np.pi  # the ground
     np.testing.assert_allclose(np.linalg.norm(sky.directions, axis=1), 1, rtol=1e-14)
     # the cosine at the centres of the rows overstates pi by 1 - cos(h/2): 1 % for MF:1
     expected = np.pi * (2 - np.cos(sky.row_height / 2))

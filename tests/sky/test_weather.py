@@ -443,3 +443,50 @@ def test_steps_of_a_day_go_by_their_length(tmp_path, year):
     """24 of an hour, 48 of half an hour, 1,440 of a minute."""
     weather = read_epw(write_epw(tmp_path / "a.epw", year))
     assert [replace(weather, step_h=step).per_day for step in (1.0, 0.5, 1 / 60)] == [24, 48, 1440]
+
+
+def test_a_missing_infrared_is_estimated_in_its_hour_alone(tmp_path, year):
+    """From the cover of the sky; without that, the hour is named."""
+    year[FEBRUARY_3_14H][INFRARED] = "9999"
+    weather = read_epw(write_epw(tmp_path / "a.epw", year))
+    stated = np.array([float(row[INFRARED]) for row in year])
+    others = np.arange(8760) != FEBRUARY_3_14H
+    np.testing.assert_array_equal(weather.horizontal_infrared[others], stated[others])
+    assert 200 < weather.horizontal_infrared[FEBRUARY_3_14H] < 400
+    year[FEBRUARY_3_14H][COVER] = year[FEBRUARY_3_14H][COVER - 1] = "99"
+    with pytest.raises(DataError, match="missing, and so is the sky cover") as caught:
+        read_epw(write_epw(tmp_path / "a.epw", year))
+    assert caught.value.field == "horizontal infrared irradiance"
+
+
+@pytest.mark.parametrize("line", range(6))
+def test_each_line_of_the_head_of_a_wea_is_asked_for(tmp_path, year, line):
+    path = tmp_path / "a.wea"
+    write_wea(read_epw(write_epw(tmp_path / "a.epw", year)), path)
+    head = path.read_text().splitlines()[:6]
+    for lines in (head[:line] or ["another"], [*head[:line], "another 1", *head[line + 1 :]]):
+        path.write_text("\n".join(lines) + "\n")
+        with pytest.raises(DataError, match="expected the header") as caught:
+            read_wea(path)
+        assert caught.value.element == f"line {line + 1}"
+
+
+@pytest.mark.parametrize(
+    ("latitude", "longitude", "good"),
+    [(90, 180, True), (-90, -180, True), (90.5, 0, False), (-90.5, 0, False), (0, 180.5, False), (0, -180.5, False)],
+)
+def test_a_weather_is_of_a_place_on_earth(chicago, latitude, longitude, good):
+    changes = {"latitude_deg": latitude, "longitude_deg": longitude}
+    if good:
+        assert replace(read_epw(chicago), **changes).latitude_deg == latitude
+    else:
+        with pytest.raises(ValueError, match="expected latitude"):
+            replace(read_epw(chicago), **changes)
+
+
+def test_days_of_the_week_count_from_the_files_first(chicago):
+    """January 1 of the file's own weekday; January 8 is the same."""
+    for first in range(7):
+        weekday = replace(read_epw(chicago), first_weekday=first).weekday
+        assert weekday[:24].tolist() == [first] * 24
+        assert weekday[24] == (first + 1) % 7 and weekday[7 * 24] == first

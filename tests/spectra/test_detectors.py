@@ -103,3 +103,29 @@ def test_light_far_from_the_planckian_locus_has_no_colour_temperature() -> None:
     assert kelvin[0] == pytest.approx(2856, abs=1) and np.isnan(kelvin[1:]).all()
     assert distance[1] == pytest.approx(0.152, abs=1e-3) and np.isnan(distance[2:]).all()
     assert np.isnan(colour_rendering(spectra[2])).all()  # was -68 and 0
+
+
+def of_uv(uv: np.ndarray) -> np.ndarray:
+    """Tristimulus values of Y = 1 of chromaticities of CIE 1960 [.., 2]."""
+    u, v = np.moveaxis(uv, -1, 0)
+    return np.stack([1.5 * u / v, np.ones_like(u), (4 - u - 10 * v) / (2 * v)], axis=-1)
+
+
+def test_a_colour_temperature_is_stated_as_far_from_the_locus_as_cie_015_does() -> None:
+    """Up to 0.05 to either side; the distance is stated beyond, too."""
+    from colour.temperature import CCT_to_uv_Robertson1968
+
+    stated = np.array([[5000.0, 0.048], [5000.0, -0.048], [5000.0, 0.052], [5000.0, -0.052]])
+    temperature, distance = colour_temperature(of_uv(CCT_to_uv_Robertson1968(stated)))
+    np.testing.assert_allclose(temperature, [5000, 5000, np.nan, np.nan], rtol=2e-3)
+    np.testing.assert_allclose(distance, stated[:, 1], atol=1e-4)
+
+
+def test_a_colour_temperature_is_stated_within_the_isotherms_and_of_any_amount_of_light() -> None:
+    """Robertson's isotherms end at 600 mired, 1,667 K."""
+    wavelength = NANOMETRES * 1e-9
+    for kelvin in (1600.0, 1700.0, 2856.0):
+        planck = wavelength**-5 / np.expm1(1.438777e-2 / (wavelength * kelvin))  # of CODATA's c2
+        for amount in (1e-6, 1.0):
+            found, _ = colour_temperature(detected(amount * planck / planck.max())[6:])
+            assert found == pytest.approx(kelvin, rel=2e-3) if kelvin > 1667 else np.isnan(found)

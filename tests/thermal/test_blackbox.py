@@ -218,3 +218,29 @@ def test_sun_in_the_layers_of_another_u_keeps_its_heat_indoors_where_it_can():
     to_outer, to_inner = absorbed_at_u(one, better, outer, inner)
     np.testing.assert_allclose(now_outer * to_outer + now_inner * to_inner, of_outer * outer + of_inner * inner)
     assert absorbed_at_u(one, worse, outer, inner)[1][0] == 0.0
+
+
+def test_g_is_compared_with_the_transmittance_of_its_own_direction():
+    """The direction in which g is farthest below, not that of most light."""
+    tau, g = np.array([0.5, 0.3]), np.array([0.6, 0.2])
+    with pytest.raises(ThermalInputError, match=r"0\.2 is below the solar transmittance 0\.300"):
+        layer_absorptances(tau, np.array([0.1, 0.1]), g, 1.2)
+
+
+@pytest.mark.parametrize("more", [0.01, 0.05])
+def test_what_a_stated_g_has_more_moves_from_the_outer_node_first(more):
+    """By its share indoors, which is 0.1 outside and 0.8 inside; the middle one stays."""
+    sun = np.array([[0.1, 0.05, 0.2, 0.3]])
+    plain, moved = (node_absorptances(sun, SHADE, one) for one in (0.0, more))
+    assert plain.outer - moved.outer == pytest.approx(more / (0.8 - 0.1))
+    assert moved.inner - plain.inner == pytest.approx(more / (0.8 - 0.1))
+    assert moved.middle == pytest.approx(plain.middle)
+
+
+@pytest.mark.parametrize("less", [0.01, 0.05])
+def test_what_a_stated_g_has_less_moves_from_the_inner_node_first(less):
+    sun = np.array([[0.1, 0.05, 0.2, 0.3]])
+    plain, moved = (node_absorptances(sun, SHADE, one) for one in (0.0, -less))
+    assert moved.outer - plain.outer == pytest.approx(less / (0.8 - 0.1))
+    assert plain.inner - moved.inner == pytest.approx(less / (0.8 - 0.1))
+    assert moved.middle == pytest.approx(plain.middle)

@@ -105,3 +105,23 @@ def test_air_from_a_room_held_dry_brings_its_held_ratio():
     high = humidity_ratio(0.35, 21.0, 101325.0)
     assert a.ratio[-1] == pytest.approx(high, rel=1e-9)
     assert b.ratio[-1] == pytest.approx(high + SOURCE / (DENSITY * FLOW), rel=1e-6)
+
+
+def closed_room(air_c: list[float], outdoor: list[float], **held: float):
+    hours = len(air_c)
+    zone = MoistZone(50.0, np.array(air_c), np.zeros(hours), np.zeros(hours), **held)
+    (humidity,) = zone_humidity([zone], np.array(outdoor), np.full(hours, 5.0), np.full(hours, 101_325.0))
+    return humidity
+
+
+def test_a_closed_room_begins_with_the_first_hours_outdoor_air_within_its_limits():
+    """Later hours have other air outdoors and other limits; nothing is added or taken at the start."""
+    assert closed_room([20.0] * 3, [0.004, 0.009, 0.009]).ratio == pytest.approx([0.004] * 3)
+    saturated = humidity_ratio(1.0, 0.0, 101_325.0)
+    assert closed_room([0.0, 20.0, 20.0], [0.009] * 3).ratio == pytest.approx([saturated] * 3)
+    half = humidity_ratio(0.5, 20.0, 101_325.0)
+    humid = closed_room([20.0, 10.0, 10.0], [0.001] * 3, humidify_to=0.5)
+    assert humid.ratio == pytest.approx([half] * 3) and humid.humidify.max() < 1e-3
+    dry = humidity_ratio(0.2, 10.0, 101_325.0)
+    held = closed_room([10.0, 20.0, 20.0], [0.009] * 3, dehumidify_to=0.2)
+    assert held.ratio == pytest.approx([dry] * 3) and held.dehumidify.max() < 1e-3

@@ -73,7 +73,7 @@ MODULES = {
     "mitsuba_cfs/matrices/mtx_io": ["sky/test_mtx_io"],
     "bim/gbxml/building": ["bim/test_read_gbxml", "bim/test_stated_use"],
     "bim/gbxml/document": ["bim/test_read_gbxml"],
-    "mitsuba_cfs/files": ["scenes/test_result_folder", "scenes/test_csv_text", "test_finite"],
+    "mitsuba_cfs/files": ["scenes/test_result_folder", "scenes/test_csv_text", "test_finite", "test_files"],
     "scenes/result_folder": ["scenes/test_result_folder"],
     "scenes/toml_file": ["scenes/test_toml_file"],
 }
