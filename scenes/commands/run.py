@@ -132,6 +132,11 @@ class Percentage(click.ParamType):
     "--energyplus", is_flag=True, help="Also write the rooms as EnergyPlus input (model.epJSON, schedules.csv)."
 )
 @click.option("--netcdf", is_flag=True, help="Also write all results to results.nc, for xarray; see docs/formats.md.")
+@click.option(
+    "--ladybug",
+    is_flag=True,
+    help="Also write illuminances to ladybug, a results folder of Ladybug Tools; see docs/formats.md.",
+)
 def command(
     out: Path, page: Path | None, settings: tuple[str, ...], processes: int | None, scheduler: str | None, **chosen
 ) -> None:
@@ -208,6 +213,7 @@ def run_to_folder(
                 report,
                 explorer,
                 netcdf=options.netcdf,
+                ladybug=options.ladybug,
                 processes=processes,
                 first_plan=plan.table,
                 progress=progress,

@@ -15,7 +15,6 @@ from markupsafe import Markup
 
 from bim.bcf import Topic, in_model, write_topics
 from bim.building_file import is_ifc
-from bim.model import Building
 from bim.report.issue import COLUMNS, Issue, issue_rows
 from bim.sensors import view_point
 from mitsuba_cfs.errors import RoomError
@@ -68,8 +67,11 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
     unknown = [room.space.label for room, one in asked if one.reached in (NOT_COMPUTED, NO_VERDICT)]
     missed = [_short_of(room.space.label, one) for room, one in asked if one.reached == NOT_MET]
     met = len(asked) - len(unknown) - len(missed)
-    parts = [f"{_capital(gettext(verdict.reached))}."]
-    if missed and not met and not unknown:
+    criterion = verdict.criterion
+    parts = [f"{_capital(gettext(criterion.words_of(verdict.reached)))}."]
+    if missed and criterion.missed != NOT_MET:
+        parts = [f"{colon(_capital(gettext(criterion.missed)), _names(missed))}."]
+    elif missed and not met and not unknown:
         parts.append(gettext("No room meets it: {rooms}.", rooms=_names(missed)))
     elif missed:
         parts.append(
@@ -94,6 +96,7 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
         parts.append(gettext("It asks for the weather of {sites}.", sites=rule.weather_asked))
     elif unknown and not rule.judges(result.weather):
         parts.append(gettext("It asks for weather whose header states {words}.", words=rule.header[0]))
+        parts += _least_favourable([(room, one) for room, one in asked if one.values[0][0] is not None])
     elif unknown and of_glare and all(room.light is None or room.light.glare is None for room, _ in asked):
         parts.append(gettext("Annual glare was not asked for."))
     rated = [room.light.glare for room, _ in asked if room.light is not None and room.light.glare is not None]
@@ -106,6 +109,8 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
 
 def _least_favourable(asked: Sequence[tuple[CheckedRoom, RoomVerdict]]) -> Iterator[str]:
     """The room nearest to the limit, where the criterion is one value against one limit."""
+    if not asked:
+        return
     (_, first), *_ = asked
     if len(first.criterion.level) > 1 or len(first.criterion.level[0].needs) > 1:
         return
@@ -180,7 +185,7 @@ def _light_plans(result: Compliance, room: CheckedRoom) -> Iterator[FloorPlan]:
         name, grid = asking
         frame = plan_frame(room.space, grid.points)
         height = decimal(f"{grid.points[0, 2] - room.space.floor_level:.2f}")
-        of_grid = gettext("Grid of {rule}, {height} m above the floor.", rule=name, height=height)
+        of_grid = gettext("Grid of {rule}, {height} m above the floor.", rule=result.rules[name].edition, height=height)
         if kind == "daylight factor":
             title, factor = gettext("Daylight factor"), 100 * grid.factor
             scale = ColourScale(0, max(float(np.ceil(factor.max())), 1.0), title, "%")
@@ -366,7 +371,7 @@ def dossier_room(result: Compliance, room: CheckedRoom, number: int) -> DossierR
         gettext("Room {room}", room=room.space.label),
         room_facts(room),
         plans(result, room),
-        tuple(map(tied, tables.missed(room))),
+        tuple(map(tied, tables.missed(result.rules, room))),
         tuple(table for table in room_tables if table.rows),
         sun_bars(result, room),
         tables.openings_table(room),
@@ -460,16 +465,16 @@ def write_room_topics(result: Compliance, path: Path) -> None:
     """
     file = result.building.file
     has_guids = file is None or is_ifc(file)  # the rooms of other formats have no IFC GUID
-    rooms = [room for room in result.rooms if any(missed(room))]
-    topics = [_topic(room, result.building, has_guids=has_guids) for room in rooms]
+    rooms = [room for room in result.rooms if any(missed(result.rules, room))]
+    topics = [_topic(result, room, has_guids=has_guids) for room in rooms]
     write_topics(topics, path, "" if file is None else file.name)
 
 
-def _topic(room: CheckedRoom, building: Building, *, has_guids: bool) -> Topic:
-    sentences = list(missed(room))
+def _topic(result: Compliance, room: CheckedRoom, *, has_guids: bool) -> Topic:
+    sentences = list(missed(result.rules, room))
     what = "criterion" if len(sentences) == 1 else "criteria"
     try:
-        camera = in_model(building, *view_point(room.space))
+        camera = in_model(result.building, *view_point(room.space))
     except RoomError:  # a room that is lower than the eye
         camera = None
     return Topic(

@@ -58,6 +58,7 @@ class CriterionTable(TomlTable):
     uses: tuple[str, ...] = ()  # of rooms of these uses alone; none: of all
     other_than: tuple[str, ...] = ()  # not of rooms of these uses
     weather: tuple[str, ...] = ()  # as of the rule: the criterion is for this weather alone
+    missed: str = NOT_MET  # in words, of a room or building that reaches no level
     level: Annotated[tuple[LevelTable, ...], Field(min_length=1)]
 
     @property
@@ -69,6 +70,10 @@ class CriterionTable(TomlTable):
     def needs(self) -> Iterator[Need]:
         """The needs of all levels."""
         return (need for level in self.level for need in level.needs)
+
+    def words_of(self, reached: str) -> str:
+        """What a page says of a level reached, in English."""
+        return self.missed if reached == NOT_MET else reached
 
 
 class SetupTable(TomlTable):

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 
 import pandas as pd
 
 from scenes.comply.assess import NOT_FOR_IT, RoomVerdict
 from scenes.comply.needs import Need
 from scenes.comply.results import CheckedRoom, Compliance
-from scenes.comply.rules import NOT_MET, CriterionTable, LevelTable
+from scenes.comply.rules import NOT_MET, CriterionTable, LevelTable, RuleTable
 from scenes.comply.uses import RoomUse
 from scenes.language.catalogue import N_, decimal, gettext
 from scenes.language.numbers import MISSING, cell, colon, rounded, semicolons
@@ -102,7 +102,14 @@ def building_table(result: Compliance, rule: str) -> Table:
         levels = [colon(n, text) for n, (_, text) in zip(names, compared, strict=True)]
         words = ", ".join(dict.fromkeys(what for what, _ in compared))
         rows.append(
-            (gettext(one.title), clause(one), words, semicolons(levels), gettext(verdict.reached), str(verdict.rooms))
+            (
+                gettext(one.title),
+                clause(one),
+                words,
+                semicolons(levels),
+                gettext(one.words_of(verdict.reached)),
+                str(verdict.rooms),
+            )
         )
     return Table(gettext("Building"), tuple(columns), tuple(rows))
 
@@ -146,7 +153,7 @@ def rooms_table(result: Compliance, rule: str) -> Table:
             room.space.label,
             use_words(room.use) if room.use.occupied else gettext("{use} (not occupied)", use=use_words(room.use)),
             rounded(room.space.floor_area, 1),
-            *(_short(room.verdicts[i].reached) for i in numbers),
+            *(_short(room.verdicts[i]) for i in numbers),
         )
         for room in result.rooms
     ]
@@ -166,7 +173,7 @@ def room_table(result: Compliance, room: CheckedRoom, rule: str) -> Table:
         for words, (value, limits) in _quantities(verdict).items():
             one = verdict.criterion
             head = (gettext(one.title), clause(one)) if first else ("", "")
-            last = gettext(verdict.reached) if first else ""
+            last = gettext(one.words_of(verdict.reached)) if first else ""
             rows.append((*head, words, value, semicolons(limits), last))
             first = False
     return Table(gettext(result.rules[rule].title), tuple(columns), tuple(rows))
@@ -182,7 +189,7 @@ def _quantities(verdict: RoomVerdict) -> dict[str, tuple[str, list[str]]]:
     return quantities
 
 
-def missed(room: CheckedRoom) -> Iterator[str]:
+def missed(rules: Mapping[str, RuleTable], room: CheckedRoom) -> Iterator[str]:
     """A sentence for each criterion that is asked of the room and of which it reaches no level."""
     for verdict in room.verdicts:
         if not (verdict.applies and verdict.asked) or verdict.reached != NOT_MET:
@@ -199,7 +206,9 @@ def missed(room: CheckedRoom) -> Iterator[str]:
             for need, value in zip(one.level[0].needs, values, strict=True)
             if not need.met(value)
         ]
-        head = f"{verdict.rule}, {gettext(one.title)} ({clause(one)})"
+        if one.missed != NOT_MET:
+            numbers.append(gettext(one.missed))
+        head = f"{rules[verdict.rule].edition}, {gettext(one.title)} ({clause(one)})"
         yield colon(head, semicolons(numbers))
 
 
@@ -260,7 +269,8 @@ def _clock(minutes: float) -> str:
     return f"{whole // 60:02d}:{whole % 60:02d}"
 
 
-def _short(reached: str) -> str:
+def _short(verdict: RoomVerdict) -> str:
+    reached = verdict.criterion.words_of(verdict.reached)
     return MISSING if reached == NOT_FOR_IT else gettext(reached)
 
 

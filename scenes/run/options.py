@@ -24,6 +24,7 @@ class JobOptions(InputOptions):
     error: float | None = None  # relative, of yearly means: fewer rays where it needs fewer
     energyplus: bool = False  # the rooms as an EnergyPlus model besides
     netcdf: bool = False  # all numbers of the run as one netCDF file besides
+    ladybug: bool = False  # illuminances as a results folder of Ladybug Tools besides
 
     @property
     def read(self) -> ReadOptions:

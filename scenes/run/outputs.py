@@ -26,6 +26,8 @@ from scenes.result_folder import EXPLORER, FIRST_PLAN, REPORT, ResultFolder
 from scenes.results import GridDaylight, RoomYear, RunResult, SpectralYear
 from scenes.room.daylight import sensor_table
 from scenes.room.glare import glare_table
+from scenes.run.ladybug import NAME as LADYBUG
+from scenes.run.ladybug import write_ladybug
 from scenes.run.netcdf import NAME as NETCDF
 from scenes.run.netcdf import write_netcdf
 from scenes.user_errors import user_message
@@ -39,6 +41,7 @@ def write_results(
     write_explorer=None,
     *,
     netcdf: bool = False,
+    ladybug: bool = False,
     processes: int | None = 1,
     first_plan: str = "",
     progress: Progress = silent,
@@ -49,6 +52,7 @@ def write_results(
         write_report: `scenes.report.write_report`, or None for no report.
         write_explorer: `scenes.explore.folder.write_explorer`, or None for no explorer.
         netcdf: whether all numbers are written as one netCDF file besides.
+        ladybug: whether the illuminances are written as a folder of Ladybug Tools besides.
         processes: that many rooms' files are written at a time; None: as of `processes_for`.
         first_plan: the table of the first plan, where there was one.
 
@@ -66,6 +70,8 @@ def write_results(
             write_text(temporary / FIRST_PLAN, first_plan)
         if netcdf:
             write_netcdf(result, temporary / NETCDF)
+        if ladybug:
+            write_ladybug(result, temporary / LADYBUG)
         if result.twin is not None:
             result.twin.write(temporary)
         for write, page in ((write_report, REPORT), (write_explorer, EXPLORER)):

@@ -28,7 +28,7 @@ from scenes.study.store import CaseResult, Compute, Store, computed
 from scenes.study.study_file import NO_SYSTEM, Study
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class StudyResult:
     """The cases of a study with their results, in the grid's order."""
 
@@ -40,6 +40,10 @@ class StudyResult:
     quick: bool = False
     explored: dict[int, ExploredCase] = field(default_factory=dict)  # by number from 1
     head: Head = NO_HEAD  # what was left out of the buildings, what was assumed in the cases
+
+    def __repr__(self) -> str:
+        failed = f", {self.failed} without a result" if self.failed else ""
+        return f"<{type(self).__name__} {self.title!r}: {len(self.results)} cases{failed}>"
 
     @property
     def failed(self) -> int:

@@ -47,7 +47,7 @@ def of_building(verdicts, key):
 
 
 def misses(rooms):
-    return {r.space.name: [text for text in missed(r) if "Exposure" in text] for r in rooms}
+    return {r.space.name: [text for text in missed(RULES, r) if "Exposure" in text] for r in rooms}
 
 
 def test_one_sunny_room_is_enough_for_its_dwelling(calendar):

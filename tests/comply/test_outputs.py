@@ -189,6 +189,24 @@ def test_an_answer_that_was_not_computed_says_why(result):
         assert text == "Not computed. It asks for the weather of Rostock."
 
 
+def test_a_criterion_has_its_own_word_for_a_miss(result):
+    """As LEED's ASE: a room above the limit is no failure, its design must be explained."""
+    assert next(one for one in read_rule("leed-v4.1").criterion if one.key == "ase").missed == "explanation required"
+    asked = result.rules["rays"].criterion[1].model_copy(update={"missed": "explanation required"})
+    rule = result.rules["rays"].model_copy(update={"criterion": (result.rules["rays"].criterion[0], asked)})
+    rooms = tuple(
+        replace(room, verdicts=(room.verdicts[0], replace(room.verdicts[1], criterion=asked))) for room in result.rooms
+    )
+    told = replace(result.verdicts[1], criterion=asked)
+    changed = replace(result, rules={"rays": rule}, rooms=rooms, verdicts=(result.verdicts[0], told))
+    sentence = dict(answers(changed))["2026 <draft>, Sun"]
+    assert sentence.startswith("Explanation required: ") and "Meeting room (0.00 h, limit ≥ 1.5 h)" in sentence
+    assert "not met" not in sentence.lower()
+    html = dossier_html(changed)
+    assert html.count(">explanation required</td>") == 2 * 2 + 1  # two rooms in two tables, the building once
+    assert "2026 &lt;draft&gt;, Sun (clause 7.2)" in html and "rays, Sun" not in html
+
+
 def test_a_dossier_with_a_title_and_without_its_rooms(result):
     options = PageOptions(title="Ours", author="A", left_out=("rooms", "sources"))
     html = dossier_html(result, page=options)
@@ -205,7 +223,7 @@ def test_a_room_says_what_it_misses(result):
         zip(("south", "north", "hatch", "dark"), dossier_html(result).split('<section id="room-')[1:], strict=True)
     )
     assert "Not met:" not in sections["south"] and "Not met:" not in sections["north"]
-    assert "rays, Sun (clause 7.2)" in sections["dark"]
+    assert "2026 &lt;draft&gt;, Sun (clause 7.2)" in sections["dark"]
     assert "0.00 h, required ≥ 1.5 h for met" in sections["dark"].replace("\xa0", " ")
 
 
@@ -258,11 +276,11 @@ def test_each_quantity_of_the_light_has_one_plan(result):
         "Daylight autonomy",
         "Sunlit hours",
     ]
-    assert "Grid of en17037, 0.85 m" in found["Illuminance in half of the daylight hours"].explanation
+    assert "Grid of EN 17037:2018+A1:2021, 0.85 m" in found["Illuminance in half of the daylight hours"].explanation
     assert "222" in found["Illuminance in half of the daylight hours"].body
     autonomy = found["Daylight autonomy"].explanation  # of sDA before BREEAM's hours
-    assert "Grid of lm83" in autonomy and "blinds operated" in autonomy
-    assert "Grid of lm83" in found["Sunlit hours"].explanation
+    assert "Grid of IES LM-83-12" in autonomy and "blinds operated" in autonomy
+    assert "Grid of IES LM-83-12" in found["Sunlit hours"].explanation
 
 
 def test_values_have_a_row_for_each_need(result, tmp_path):

@@ -167,9 +167,11 @@ def test_clear_hours_of_the_equinoxes(calendar):
 
 def test_a_sentence_names_what_is_missed_alone():
     """Half of the plane has its 310 lx; 95 % of it have 50 lx."""
-    criterion = read_rule("en17037").criterion[0]
+    rule = read_rule("en17037")
+    criterion = rule.criterion[0]
     verdict = RoomVerdict("en17037", criterion, True, ((310.0, 50.0),) * 3)
-    (text,) = missed(SimpleNamespace(verdicts=(verdict,)))
+    (text,) = missed({"en17037": rule}, SimpleNamespace(verdicts=(verdict,)))
+    assert text.startswith("EN 17037:2018+A1:2021, Daylight provision")
     assert "95 % of the reference plane" in text and "50 lx, required ≥ 100 lx for minimum" in text
     assert "310 lx" not in text
 

@@ -54,7 +54,7 @@ def test_nothing_is_fetched(page) -> None:
     assert links.found
     empty = "data:,"  # an icon that a browser need not ask for
     assert all(link == empty or link.startswith(("data:image/", "#")) for link in links.found)
-    assert not re.search(r"url\(|@import|\bfetch\(|XMLHttpRequest|import\(", page)
+    assert not re.search(r"url\((?!#)|@import|\bfetch\(|XMLHttpRequest|import\(", page)
     policy = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
     assert policy in page  # the browser itself refuses the network
 
@@ -208,7 +208,7 @@ def test_a_room_shows_one_picture_in_colour_where_it_has_one() -> None:
     first, second = result.spaces
     plain = replace(second, glare=replace(second.glare, colour=None))
     html = report_html(replace(result, spaces=(first, plain)))
-    assert html.count("<figcaption><b>In colour: ") == 1
+    assert html.count("<b>In colour: ") == 1
     found = gallery(result, first).colour
     assert first.glare.colour is not None and gallery(result, plain).colour is None
     assert found.title in html and found.round

@@ -36,7 +36,7 @@ def call(out, *options, building=OFFICE, weather=WEATHER, system=SYSTEM) -> int:
 def results(tmp_path_factory) -> Path:
     """The files of one quick run."""
     out = tmp_path_factory.mktemp("run") / "out"
-    assert call(out, *QUICK, *["--netcdf"] * NETCDF) == 0
+    assert call(out, *QUICK, "--ladybug", *["--netcdf"] * NETCDF) == 0
     return out
 
 
@@ -54,6 +54,7 @@ def test_files_of_a_run(results):
         "comfort.csv",
         "view_06-21_12h.hdr",
         "view_06-21_12h.png",
+        "ladybug",
         *["results.nc"] * NETCDF,
     }
     illuminance = pd.read_parquet(results / "illuminance.parquet")
@@ -132,6 +133,20 @@ def test_netcdf_holds_the_numbers_of_the_tables_with_their_units(results):
         assert all(values.attrs["units"] and values.attrs["long_name"] for values in numbers)
         assert data.attrs["Conventions"].startswith("CF-")
         assert list(data["room_label"].to_numpy()) == ["A South office"]
+
+
+def test_the_folder_of_ladybug_tools_has_the_illuminances_of_the_run(results):
+    """Read back as AnnualDaylight does: dark hours are zero."""
+    folder = results / "ladybug"
+    (grid,) = json.loads((folder / "grids_info.json").read_text("utf-8"))
+    hours = [float(line) for line in (folder / "sun-up-hours.txt").read_text().split()]
+    light = pd.read_parquet(results / "illuminance.parquet").to_numpy()
+    file = folder / "__static_apertures__" / "default" / "total" / f"{grid['full_id']}.npy"
+    found = np.zeros_like(light)
+    found[[int(hour) for hour in hours]] = np.load(file).T
+    assert grid["name"] == "A South office" and grid["count"] == light.shape[1]
+    assert 4000 < len(hours) < 5000
+    np.testing.assert_allclose(found, light, rtol=1e-6)
 
 
 def test_netcdf_without_its_packages_is_one_line_at_once(tmp_path, capsys, monkeypatch):
