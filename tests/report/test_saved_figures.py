@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import re
 import time
 import xml.etree.ElementTree as ET
@@ -22,21 +23,28 @@ SVG = "{http://www.w3.org/2000/svg}"
 FIGURES = "[...document.querySelectorAll('figure:has(.save)')].filter((f) => f.getClientRects().length).slice(0, 20)"
 
 
+# The browser saves few files that a script asks for: the page's own file is read in place of the saved one
+READ = """(() => {
+  const object = URL.createObjectURL, click = HTMLAnchorElement.prototype.click;
+  URL.createObjectURL = (blob) => { window.made = blob; return object.call(URL, blob); };
+  HTMLAnchorElement.prototype.click = function () { window.madeName = this.download; };
+  window.stopReading = () => { URL.createObjectURL = object; HTMLAnchorElement.prototype.click = click; };
+})()"""
+BYTES = """new Promise((done) => {
+  const reader = new FileReader();
+  reader.onload = () => done([window.madeName, reader.result.split(",")[1]]);
+  reader.readAsDataURL(window.made);
+})"""
+
+
 def saved(page: Page, folder: Path, figure: int, kind: str) -> Path:
     """The file that a button of the figure of that number gives."""
-    for old in folder.iterdir():
-        old.unlink()
-    if figure:
-        page.value(f"{FIGURES}[{figure}].querySelector('.save [data-kind={kind}]').click()")
-    else:
-        page.value(f"{FIGURES}[0].id = 'first'")
-        page.click(f"#first .save [data-kind={kind}]")
-    end = time.monotonic() + WAIT
-    while not (new := [one for one in folder.iterdir() if one.suffix in (".svg", ".png") and one.stat().st_size]):
-        assert time.monotonic() < end, "nothing was saved"
-        page.value("0")  # reads what the browser tells, such as addresses of pictures: else it waits
-        time.sleep(0.02)
-    return new[0]
+    page.value("window.made = undefined; window.madeName = undefined")
+    page.value(f"{FIGURES}[{figure}].querySelector('.save [data-kind={kind}]').click()")
+    page.until("window.made !== undefined && window.madeName !== undefined")
+    name, data = page.value(BYTES)
+    (folder / name).write_bytes(base64.b64decode(data))
+    return folder / name
 
 
 @pytest.fixture(scope="module", params=["report", "study"])
@@ -49,7 +57,9 @@ def opened(request, tmp_path_factory):
     downloads.mkdir()
     with Page(folder, "--force-dark-mode") as page:
         page.open((folder / "page.html").as_uri(), ready="document.readyState === 'complete'")
-        page.send("Page.setDownloadBehavior", behavior="allow", downloadPath=str(downloads))
+        assert page.value("getComputedStyle(document.querySelector('.save')).display") == "none"
+        page.click("button.figures")
+        page.value(READ)
         yield page, downloads
         assert page.faults == []
 
@@ -118,3 +128,18 @@ def test_lines_are_where_the_page_has_them(opened) -> None:
         # a stroke is at most 3 pixels wide, and belongs to the page's box
         found = [s for s in spans if abs(s[4] - left) < 4 and abs(s[0] - (right - left)) < 7]
         assert any(abs(s[1] - (bottom - top)) < 7 and abs(s[5] - top) < 4 for s in found), (left, right, top, bottom)
+
+
+def test_a_click_saves_a_file(opened, tmp_path) -> None:
+    page, _ = opened
+    page.value("window.stopReading()")
+    page.send("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
+    page.value(f"{FIGURES}[0].id = 'first'")
+    page.click("#first .save [data-kind=svg]")
+    end = time.monotonic() + WAIT
+    while not any(one.suffix == ".svg" and one.stat().st_size for one in tmp_path.iterdir()):
+        assert time.monotonic() < end, "nothing was saved"
+        page.value("0")
+        time.sleep(0.02)
+    page.click("button.figures")
+    assert page.value("getComputedStyle(document.querySelector('.save')).display") == "none"

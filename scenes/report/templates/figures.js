@@ -206,8 +206,16 @@
     return new Promise((done) => { canvas.toBlob(done, "image/png"); });
   }
 
-  for (const buttons of document.querySelectorAll(".save")) {
-    buttons.hidden = false;
+  const all = document.querySelectorAll(".save");
+  const shown = document.querySelector("button.figures");
+  shown.hidden = all.length === 0;
+  shown.addEventListener("click", () => {
+    const show = shown.getAttribute("aria-pressed") === "false";
+    shown.setAttribute("aria-pressed", String(show));
+    for (const buttons of all) buttons.hidden = !show;
+  });
+
+  for (const buttons of all) {
     const figure = buttons.closest("figure");
     buttons.addEventListener("click", async ({ target }) => {
       if (target.tagName !== "BUTTON") return;
