@@ -588,6 +588,7 @@ REGRESSIONS: list[tuple[str, int]] = [
     ("light of slats", 58),
     ("observers", 51),
     ("mesh of glTF", 294),
+    ("mesh of glTF", 2515),
     ("mesh of PLY", 77),
     ("project", 48),
     ("request", 633),

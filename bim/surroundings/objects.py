@@ -79,6 +79,8 @@ def read_meshes(path: Path) -> SurroundingsFile:
         raise DataError(f"is no {kind.upper()} mesh: {reason or type(error).__name__}", file=path) from None
     objects = []
     for number, (named, triangles) in enumerate(meshes, 1):
+        if triangles.shape[1:] != (3, 3):
+            raise DataError("has corners without three coordinates", file=path)
         if kind in ("glb", "gltf"):
             triangles = triangles @ UP[:3, :3].T
         if not are_coordinates(triangles):
