@@ -185,7 +185,7 @@ def test_sunlit_elements_are_found_again_under_any_light(tmp_path, elements_trac
         pairs = list(zip(arrays(one), arrays(other), strict=True))
         assert len(pairs) > 30 and one.sunlit.mean.near.nnz > 0 and one.sunlit.close.any()
         for a, b in pairs:
-            assert a.dtype == b.dtype
+            assert a.dtype == b.dtype or a.dtype.kind == b.dtype.kind == "i"  # a file has columns' numbers in 32 bits
             np.testing.assert_array_equal(a, b)
 
 
