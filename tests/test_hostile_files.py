@@ -591,6 +591,7 @@ REGRESSIONS: list[tuple[str, int]] = [
     ("mesh of glTF", 2515),
     ("mesh of PLY", 77),
     ("project", 48),
+    ("project", 14299),
     ("request", 633),
 ]
 

@@ -13,11 +13,12 @@ The page changes only what it shows; keys and entries of others in these files s
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import threading
 import unicodedata
-from collections.abc import Callable, Mapping, MutableMapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, MutableMapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import wraps
@@ -448,7 +449,7 @@ class Project:
     def _table(self, name: str, model: type[BaseModel]) -> dict[str, Any]:
         """A TOML file of the project, whose values are of the model's kinds; empty where there is none."""
         path = self.folder / name
-        table = read_table(path) if path.is_file() else {}
+        table = _finite_table(path) if path.is_file() else {}
         check_kinds(model, table, path)
         return table
 
@@ -456,7 +457,7 @@ class Project:
         """The corrections beside the building's first file."""
         files = self.building()
         path = corrections_file(self.folder / files[0]) if files else None
-        return read_table(path) if path is not None and path.is_file() else {}
+        return _finite_table(path) if path is not None and path.is_file() else {}
 
     def uses(self) -> dict[str, str]:
         """Uses of rooms that the page states, by GUID."""
@@ -578,3 +579,21 @@ def _number(value: Any, field: str) -> float | None:
     if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > 1e5:
         raise DataError("expected a number", field=field)
     return float(value)
+
+
+def _finite_table(path: Path) -> dict[str, Any]:
+    """A TOML file; `DataError` for a number that is not finite, which no page can hold."""
+    table = read_table(path)
+    field = next(_not_finite(table), None)
+    if field is not None:
+        raise DataError("expected a finite number", file=path, field=field)
+    return table
+
+
+def _not_finite(value: object, field: str = "") -> Iterator[str]:
+    """The fields whose numbers are infinite or none."""
+    if isinstance(value, float) and not math.isfinite(value):
+        yield field
+    entries = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, entry in entries:
+        yield from _not_finite(entry, f"{field}.{key}" if field else str(key))
