@@ -520,7 +520,7 @@ def _outdoors_seen(light: PhaseLight, group: GroupCoefficients, parts: NDArray[n
 
 
 def _ground_seen(light: PhaseLight, group: GroupCoefficients, parts: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Shares [S, 1, K] of the patches of incidence in what sensors see of the ground, one patch with no direction."""
+    """Shares [S, 1, K] of the patches of incidence in the direct light of the ground, one patch with no direction."""
     matrices = light.matrices
     view = sensor_matrix(matrices).values if matrices.direct_sensors is None else matrices.direct_sensors
     daylight = matrices.daylight.values if matrices.direct_daylight is None else matrices.direct_daylight

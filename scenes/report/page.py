@@ -164,7 +164,8 @@ UNIT_AFTER_NUMBER = re.compile(r"(\d) (°C|%|lx|h|m²|m³|kWh|cd/m²)(?!\w)")
 OPTION = re.compile(r"(?<!\w)--[a-z][\w-]*")
 UNIT_EXPONENT = re.compile(r"(?<![\w.-])(k?m|cm|mm)([23])(?![\w.-])")
 EXPONENTS = {"2": "²", "3": "³"}
-SCRIPTS = ("tables.js", "pointer.js", "figures.js", "viewer.js", "storeys.js")
+SCRIPTS = ("tables.js", "pointer.js", "viewer.js", "storeys.js")
+SAVING = "figures.js"  # of pages with figures to save
 
 
 def write_report(result: RunResult, path: Path, page: PageOptions = OWN_PAGE) -> None:
@@ -234,7 +235,7 @@ def _filled(result: RunResult, page: PageOptions) -> str:
             method=method_words(result),
             glossary=glossary(),
             style=Markup(FILES["style.css"]),
-            scripts=Markup("\n".join(FILES[name] for name in SCRIPTS)),
+            scripts=Markup("\n".join(FILES[name] for name in (*SCRIPTS, SAVING))),
         )
     )
 

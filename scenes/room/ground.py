@@ -90,13 +90,13 @@ def _on_ground(
     wind = float(np.mean(weather.wind_speed))
     floors = [s for s in surfaces if s.outside == "ground" and s.normal[2] < DOWNWARDS]
     area = table.area or sum(s.area for s in floors)
-    grounded = []
+    result = []
     for number, surface in enumerate(surfaces):
         if surface.outside != "ground" or number in kept:
-            grounded.append(surface)
+            result.append(surface)
             continue
         element = _element(surface, floors, table, area, wind)
-        grounded.append(
+        result.append(
             replace(
                 surface,
                 layers=element.layers(surface.layers),
@@ -104,7 +104,7 @@ def _on_ground(
                 beyond_c=element.temperature(table.indoor_c, *year, hours),
             )
         )
-    return grounded
+    return result
 
 
 def _element(

@@ -246,7 +246,7 @@ def _filled(study: StudyResult, page: PageOptions, done: Sequence[tuple[int, Cas
     errors = [r.figures["illuminance_error_mean"] for _, _, r in done]
     worst = max(r.figures["illuminance_error_max"] for _, _, r in done)
     styles = (run_page.FILES["style.css"], FILES["study.css"])
-    scripts = [run_page.FILES[name] for name in run_page.SCRIPTS]
+    scripts = [run_page.FILES[name] for name in (*run_page.SCRIPTS, run_page.SAVING)]
     scripts += [FILES[name] for name in SCRIPTS]
     return (
         run_page.environment(FILES)

@@ -14,6 +14,7 @@ from bim.ifc.building import read_ifc
 from scenes.commands.ifc import command
 from scenes.report.model3d import checked_model
 from tests.bim.small_ifc import DEPTH, HEIGHT, WIDTH, box_model, box_room
+from tests.devtools import Page, chromium
 from tests.issues import of_code
 
 
@@ -74,3 +75,13 @@ def test_the_arrow_points_north_whatever_the_axes_of_the_model(tmp_path, north_d
     assert (tip - tail)[0] == pytest.approx(0.0, abs=0.01) and (tip - tail)[1] > 0.5
     assert arrow[:, 1].max() < walls[:, 1].min()  # outside the house, on the ground
     assert np.ptp(arrow[:, 2]) < 0.01
+
+
+@pytest.mark.skipif(chromium() is None, reason="no Chromium on this machine")
+def test_the_page_runs_without_a_fault_and_draws_the_model(tmp_path) -> None:
+    box_room().write(str(tmp_path / "m.ifc"))
+    page_data(tmp_path / "m.ifc", tmp_path / "m.html")
+    with Page(tmp_path) as page:
+        page.open((tmp_path / "m.html").as_uri(), ready="document.readyState === 'complete'")
+        page.until("document.getElementById('viewer').width > 300")  # a canvas has 300 before it is drawn on
+        assert page.faults == []

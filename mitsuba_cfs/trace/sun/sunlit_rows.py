@@ -143,8 +143,9 @@ class SunlitRows:
 def sparse_arrays(name: str, matrix: sparse.csr_array) -> dict[str, NDArray[Any]]:
     """A sparse matrix as the arrays of a file, numbers of columns in 32 bits where these suffice."""
     kind = sparse.get_index_dtype(maxval=max(matrix.nnz, *matrix.shape))
-    arrays = {f"{name}_{part}": np.asarray(getattr(matrix, part)) for part in SPARSE}
-    return arrays | {f"{name}_{part}": arrays[f"{name}_{part}"].astype(kind) for part in ("indices", "indptr")}
+    indices, starts = matrix.indices.astype(kind, copy=False), matrix.indptr.astype(kind, copy=False)
+    parts = matrix.data, indices, starts, np.asarray(matrix.shape)
+    return {f"{name}_{part}": array for part, array in zip(SPARSE, parts, strict=True)}
 
 
 def sparse_matrix(data: Mapping[str, NDArray[Any]], name: str) -> sparse.csr_array:
