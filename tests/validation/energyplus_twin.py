@@ -44,6 +44,7 @@ RADIATED = "Surface Inside Face Net Surface Thermal Radiation Heat Gain Rate"
 WINDOWS = (LAYER.format(1), LAYER.format(2), INSIDE_FACE, OUTSIDE_FACE, CONVECTED, RADIATED)
 # our sums of the sun, and what the table calls them
 SUMS = {"incident_w": "sun on", "transmitted_w": "sun in", "absorbed_room_w": "sun kept"}
+BEYOND = "at_and_beyond_inner_glass_w"  # sun that doorways and glass pass to other rooms, which EnergyPlus' model keeps
 
 
 def compared(
@@ -209,6 +210,7 @@ def _rows(zones: Sequence[str], found: BalancedRooms, theirs: pd.DataFrame) -> p
         for key, name in SUMS.items():
             row[name] = room.gains.get(key, np.zeros(1)).sum() / 1e3
             row[f"{name} E+"] = sums[key].sum() / 1e3
+        row["sun to rooms"] = room.gains.get(BEYOND, np.zeros(1)).sum() / 1e3
         rows.append(row)
     table = pd.DataFrame(rows).set_index("room")
     total = table.drop(columns=["air RMSE", "bias"]).sum()
