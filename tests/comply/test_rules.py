@@ -11,6 +11,7 @@ import pytest
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.metrics import en17037
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.matrix import sky_series
 from scenes.comply.assess import (
@@ -30,6 +31,7 @@ from scenes.comply.tables import missed
 from scenes.comply.uses import RoomUse
 from scenes.comply.view_out import ViewOut
 from scenes.demo import WEATHER
+from scenes.language.catalogue import TRANSLATED, in_language, translated
 
 OFFICE = RoomUse("office", True, "")
 STORE = RoomUse("storage", False, "")
@@ -69,6 +71,15 @@ def test_each_rule_is_whole(name):
         assert criterion.clause and all(need.words for need in criterion.needs)
         for level in criterion.level:
             assert level.over != "area mean" or len(level.needs) == 1
+
+
+@pytest.mark.parametrize("language", TRANSLATED)
+def test_included_and_left_out_parts_are_translated(language):
+    """A German dossier has no English sentence; sources alone are quoted."""
+    rules = [read_rule(name) for name in rule_names()]
+    sentences = {text for rule in rules for text in (*rule.included, *rule.left_out)}
+    with in_language(language):
+        assert not {text for text in sentences if translated(Note(text)) == text}
 
 
 def test_daylight_factors_are_those_of_table_a3(calendar):
