@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -108,6 +108,14 @@ class KnownFenestration:
         """
         result = {g: s.fine if band == "visible" else s.solar for g, s in self.systems.items()}
         return {g: BsdfFile({"Visible": bsdf}, self.systems[g].name) for g, bsdf in result.items()}
+
+
+def glazing_data(spaces: Sequence[Space], file: Path) -> dict[str, str]:
+    """The results that a building's file has glazing data for, by window GUID: "all", "light" or "none"."""
+    light = known_fenestration(spaces, file).systems
+    heat = known_fenestration(spaces, file, WindowOverrides()).systems
+    guids = (window.guid for space in spaces for window in space.windows)
+    return {guid: "all" if guid in heat else "light" if guid in light else "none" for guid in guids}
 
 
 def known_fenestration(

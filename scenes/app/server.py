@@ -375,6 +375,7 @@ class AppServer:
             "surroundings": study.get("surroundings", []),
             "systems": systems,
             "sheets": self._sheets(systems),
+            "operated": "system" in operation,  # the operation file has systems of its own
             "quick": study.get("quick", False),
             "loads": {key: operation.get("loads", {}).get(key) for key in LOADS}
             | {key: gains.get(key) for key in GAINS},

@@ -88,7 +88,7 @@ def command(
 
     from bim.building_file import named_spaces
     from scenes.commands.progress_bar import ProgressBar
-    from scenes.fenestration_exports import known_fenestration
+    from scenes.fenestration_exports import glazing_data, known_fenestration
     from scenes.head import head_of
     from scenes.input_files import building_of
 
@@ -139,7 +139,7 @@ def command(
 
         uses = uses_of_rooms(read, read.spaces, read_uses(), options.linked)
         facts = {guid: (use.key, str(use.source), use.assumed) for guid, use in uses.items()}
-        data = check_record(read, lines, facts)
+        data = check_record(read, lines, facts, glazing_data(read.spaces, options.building))
         write_text(record, json_text(data, ensure_ascii=False) + "\n")
         console.print(f"data: {record}", markup=False, highlight=False)
     if issues is not None:

@@ -15,19 +15,25 @@ from scenes.report.model3d import checked_model
 DOUBTS = ("loss", "warning", "assumption")
 
 
-def check_record(building: Building, head: Sequence[str], uses: Mapping[str, tuple[str, str, bool]]) -> dict[str, Any]:
+def check_record(
+    building: Building,
+    head: Sequence[str],
+    uses: Mapping[str, tuple[str, str, bool]],
+    glazing: Mapping[str, str],
+) -> dict[str, Any]:
     """What `cfs check --json` writes: site, head, rooms, issues, and the 3D model of the viewer.
 
     Args:
         head: the first lines of the check.
         uses: of each room by GUID: key, where it is from, and whether it is assumed.
+        glazing: of each window by GUID: the results that the file has glazing data for, "all", "light" or "none".
     """
     return {
         "name": building.name,
         "file": "" if building.file is None else building.file.name,
         "site": {"latitude_deg": building.latitude_deg, "longitude_deg": building.longitude_deg},
         "head": list(map(str, head)),
-        "rooms": [_room(space, building.issues, uses) for space in building.spaces],
+        "rooms": [_room(space, building.issues, uses, glazing) for space in building.spaces],
         "issues": [
             {
                 "code": kind.first.code,
@@ -43,7 +49,12 @@ def check_record(building: Building, head: Sequence[str], uses: Mapping[str, tup
     }
 
 
-def _room(space: Space, issues: Iterable[Issue], uses: Mapping[str, tuple[str, str, bool]]) -> dict[str, Any]:
+def _room(
+    space: Space,
+    issues: Iterable[Issue],
+    uses: Mapping[str, tuple[str, str, bool]],
+    glazing: Mapping[str, str],
+) -> dict[str, Any]:
     elements = {space.guid, space.label, space.name, *(w.guid for w in space.windows)}
     elements |= {face.element for face in space.faces if face.element is not None}
     doubts = {issue.severity for issue in issues if issue.where in elements}
@@ -64,6 +75,7 @@ def _room(space: Space, issues: Iterable[Issue], uses: Mapping[str, tuple[str, s
                 "name": window.name,
                 "glass_m2": round(window.area, 2),
                 "facing": "up" if window.normal[2] > 0.7 else compass(window.normal),
+                "glazing": glazing.get(window.guid, "none"),
             }
             for window in space.windows
         ],

@@ -1,5 +1,5 @@
 // Step 4: what to compute, its commands, and how far they are.
-import { byId, commandLine, fill, h, post, spoken, tried } from "./dom.js";
+import { byId, commandLine, fill, h, post, spoken, tried, unfilledText } from "./dom.js";
 import { jobName, lastLine, progressText, share } from "./jobs.js";
 
 const { gettext, ngettext } = cfs;
@@ -11,7 +11,9 @@ const wanted = () => ({ ...page.wanted, language: page.language });
 
 // The commands of what is chosen, as the program would run them
 async function plan() {
-  const text = JSON.stringify([wanted(), page.state]);
+  const { report, compare, standards } = page.wanted, heat = report || compare;
+  const lacking = heat || standards.length ? page.unfilled(heat) : 0;
+  const text = JSON.stringify([wanted(), page.state, lacking]);
   if (text === asked) return;
   asked = text;
   let fault = "";
@@ -21,8 +23,9 @@ async function plan() {
     planned = [];
     fault = error.message;
   }
+  if (lacking && !fault) fault = unfilledText(lacking);
   const button = byId("start");
-  button.disabled = !planned.length;
+  button.disabled = !planned.length || lacking > 0;
   byId("plan-fault").textContent = fault || (planned.length ? "" : gettext("Choose what to compute."));
   fill(byId("plan"), planned.map((one) => h("li", {}, commandLine(one.command))));
   byId("plan-count").textContent = ngettext("{count} command", "{count} commands", planned.length);

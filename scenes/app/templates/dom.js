@@ -71,6 +71,11 @@ export function commandLine(text) {
   return h("div", { class: "command" }, h("code", { tabindex: "0" }, text), copy);
 }
 
+// What the building's file lacks, before a command refuses it
+export const unfilledText = (count) => cfs.ngettext(
+  "{count} window of the chosen rooms has no glazing data in the building's file: choose a system in step 3.",
+  "{count} windows of the chosen rooms have no glazing data in the building's file: choose a system in step 3.", count);
+
 // Say something to all who listen: a fault stays until it is closed
 export function notice(text, kind = "fault") {
   const box = h("div", { class: `notice ${kind}` }, h("p", {}, text),

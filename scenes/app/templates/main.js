@@ -61,6 +61,13 @@ const page = {
     const rooms = this.check?.rooms || [], named = this.state.spaces;
     return rooms.filter((room) => (named.length ? named.includes(room.guid) || named.includes(room.label) : room.windows.length));
   },
+  // Windows of these rooms without glazing data in the building's file, where no variant fills them
+  unfilled(heat = true) {
+    if (this.state.systems.length || (heat && this.state.operated)) return 0;
+    const enough = heat ? ["all"] : ["all", "light"];
+    const windows = this.chosen.flatMap((room) => room.windows);
+    return new Set(windows.filter((one) => !enough.includes(one.glazing ?? "all")).map((one) => one.guid)).size;
+  },
   show() {
     if (!this.state) return;
     byId("title").textContent = this.state.title || this.state.name;
@@ -83,7 +90,7 @@ function mark(name) {
   const { state, check } = page;
   if (name === "files") return state.building.length && state.weather.length ? "done" : "todo";
   if (name === "building") return check && state.building.length ? (check.rooms.some((room) => room.doubt) ? "doubt" : "done") : "todo";
-  if (name === "systems") return state.systems.length ? "done" : "todo";
+  if (name === "systems") return state.systems.length ? "done" : page.unfilled() ? "doubt" : "todo";
   const results = state.results.filter((one) => one.pages.report || one.pages.dossier);
   return results.length ? "done" : "todo";
 }

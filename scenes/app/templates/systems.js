@@ -1,5 +1,5 @@
 // Step 3: the systems of the windows, from the library or from files; each is a variant.
-import { byId, fill, h, post, tried } from "./dom.js";
+import { byId, fill, h, post, tried, unfilledText } from "./dom.js";
 
 const { gettext, fixed } = cfs;
 let page = null;
@@ -23,7 +23,10 @@ function named(system) {
 
 function drawChosen() {
   const { systems, sheets } = page.state;
+  const lacking = page.unfilled();
   byId("no-systems").hidden = systems.length > 0;
+  byId("no-systems").textContent = lacking ? unfilledText(lacking) : gettext("No variant yet.");
+  byId("no-systems").className = lacking ? "fault" : "soft";
   fill(byId("chosen"), systems.map((system) => {
     const file = system.bsdf || system.operation, sheet = sheets[file];
     return h("li", { class: "card" }, named(system),
@@ -67,6 +70,7 @@ for (const id of ["glazing", "shade"]) byId(id).addEventListener("change", drawS
 byId("add-system").addEventListener("click", () => tried(async () => {
   const glazing = byId("glazing").value, shade = byId("shade").value;
   await post("library", { glazing, shade, moving: Boolean(shade) && byId("moving").checked });
+  await page.refresh(); // one whose files are there already is a variant at once
   await page.news();
   byId("making").hidden = false;
 }));
