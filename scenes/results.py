@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bim.model import Building, Space
 from bim.report.issue import Issue
 from mitsuba_cfs.glare.annual import AnnualGlare
+from mitsuba_cfs.glare.classes import LIMITS, hour_not_exceeded
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.notes import Note
 from scenes.fenestration.peaks import lobe_notes
@@ -43,6 +44,59 @@ class LuminancePicture:
     glare: dict[str, float]
     # the pixels of all glare sources; [n, ny, nx] masks of each would be large
     source_mask: NDArray[np.bool_] | None = None  # [ny, nx]
+
+
+@dataclass(frozen=True, slots=True)
+class GlareMap:
+    """DGP of seated eyes over a room in several directions, with the shading of each hour.
+
+    By `mitsuba_cfs.methods.glare_map`, without pictures.  Hours are those of use; in the dark DGP is 0.
+    """
+
+    eyes: NDArray[np.float64]  # [E, 3] [m]
+    directions: NDArray[np.float64]  # [N, 3] unit vectors, the same at each eye
+    shares: NDArray[np.float64]  # [3, E, N] of the hours of use above each of `LIMITS`, 0 to 1
+    not_exceeded: NDArray[np.float64]  # [E, N] DGP that is exceeded in at most 5 % of them
+    spacing: float  # of the eyes [m]
+    hours_of_use: float  # of a year [h]
+
+    @classmethod
+    def of(
+        cls,
+        eyes: NDArray[np.float64],
+        directions: NDArray[np.float64],
+        dgp: NDArray[np.float32],
+        *,
+        spacing: float,
+        step_h: float,
+    ) -> GlareMap:
+        """From the DGP of the hours of use [E, N, U]."""
+        shares = np.stack([np.mean(dgp > limit, axis=2) for limit in LIMITS])
+        exceeded = np.apply_along_axis(hour_not_exceeded, 2, dgp)
+        return cls(eyes, directions, shares, exceeded, spacing, step_h * dgp.shape[2])
+
+    def worst(self, count: int = 1) -> list[tuple[int, int]]:
+        """Eyes and directions with most glare, the worst first.
+
+        By the DGP exceeded in 5 % of the hours of use; of equal ones, as where DGP is 1, by the share
+        of the hours above the highest limit.
+        """
+        order = np.lexsort([-self.shares[-1].ravel(), -self.not_exceeded.ravel()])
+        eye, direction = np.unravel_index(order[:count], self.not_exceeded.shape)
+        return list(zip(eye.tolist(), direction.tolist(), strict=True))
+
+    def table(self) -> pd.DataFrame:
+        """One row for each eye and direction: hours of use above each limit, and the DGP exceeded in 5 %."""
+        eye, direction = (a.ravel() for a in np.indices(self.not_exceeded.shape))
+        point, way = self.eyes[eye], self.directions[direction]
+        columns: dict[str, NDArray[Any]] = {"eye": eye + 1}
+        columns |= dict(zip("xyz", point.T, strict=True))
+        columns["direction_deg"] = np.degrees(np.arctan2(way[:, 0], way[:, 1])) % 360  # from north by east
+        for limit, share in zip(LIMITS, self.shares, strict=True):
+            columns[f"hours_above_{limit:.2f}"] = self.hours_of_use * share.ravel()
+        columns["hours_of_use"] = np.full(len(eye), self.hours_of_use)
+        columns["dgp_exceeded_in_5_percent"] = self.not_exceeded.ravel()
+        return pd.DataFrame(columns)
 
 
 @dataclass(frozen=True, slots=True)
@@ -328,6 +382,7 @@ class RoomYear:
     as_lobe: dict[str, float] = field(default_factory=dict)  # of `scenes.room.lobes`
     issues: tuple[Issue, ...] = ()  # of the traced model
     explored: ExploredRoom | None = None  # for the explorer
+    glare_map: GlareMap | None = None  # of a year of glare
     template: str = ""  # name of the equal room that was computed; "": this room
     borrowed: str = ""  # note on the daylight through inner glass; "": none
 

@@ -326,6 +326,17 @@ def window_light(matrices: PhaseMatrices, q: int, optics: SystemOptics, sky: Ann
     return WindowLight(whole[0], sun[0], None if beams is None else beams[0])
 
 
+def luminance_without_beam(
+    matrices: PhaseMatrices, q: int, optics: SystemOptics, sky: AnnualSky
+) -> NDArray[np.float32]:
+    """The luminance of a window part towards the room without the sun's straight beam [K, L] [cd/m2]."""
+    T = [optics.transmission.astype(np.float32)]
+    daylight = matrices.daylight.values[q : q + 1].astype(np.float32)
+    whole = phases.room_side_radiance(T, daylight, sky.whole.astype(np.float32))[0]
+    beams = sun_beams(matrices, q, optics, sky)
+    return np.asarray(whole if beams is None else np.maximum(whole - beams[0], 0), dtype=np.float32)
+
+
 def sun_beams(
     matrices: PhaseMatrices, q: int, optics: SystemOptics, sky: AnnualSky
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:

@@ -21,8 +21,7 @@ from bim.sensors import plane_sides
 from bim.templates import template_rooms
 from mitsuba_cfs.errors import DataError, RoomError
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.methods.glare import hourly_glare
-from mitsuba_cfs.methods.light import direct_sun_by_group, illuminance, with_view
+from mitsuba_cfs.methods.light import direct_sun_by_group, illuminance
 from mitsuba_cfs.metrics.autonomy import daylight_autonomy
 from mitsuba_cfs.metrics.en17037 import HALF_TIME, exceeded, greatest_cell
 from mitsuba_cfs.metrics.lm83 import blinds_operated, sunlit_hours
@@ -31,11 +30,13 @@ from mitsuba_cfs.notes import Note
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.spectra.detectors import DETECTORS, detected, equivalent_daylight
-from scenes.comply.assess import asked_of, assess_room, values_of
+from scenes.comply.assess import applies, asked_of, assess_room, values_of
 from scenes.comply.blinds import DEFAULT_NAME, open_and_closed
 from scenes.comply.dwellings import dwelling_words, judged, uses_of_rooms
 from scenes.comply.files import ComplyFiles, read_files
-from scenes.comply.findings import EyeLight, Findings, GridLight, RoomHeat, SeatGlare, calendar_of
+from scenes.comply.findings import EyeLight, Findings, GridLight, RoomHeat, calendar_of
+from scenes.comply.glare import MAP_ERROR, PICTURED, seat_glare, worst_seat_glare
+from scenes.comply.needs import DgpExceeded
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outdoors import OutdoorMesh, outdoors_of
 from scenes.comply.results import CheckedRoom, Compliance, GridSummary, RoomLights
@@ -55,7 +56,7 @@ from scenes.language.catalogue import N_
 from scenes.report.method import METHODS
 from scenes.room.control_groups import same_control
 from scenes.room.daylight import overcast_factor
-from scenes.room.glare import rating_of
+from scenes.room.glare import MAP_DIRECTIONS, MAP_EYES, MAP_SPACING
 from scenes.room.ground import assumed_ground_note
 from scenes.room.heat import heat_alone
 from scenes.room.inputs import RoomInputs, room_inputs, skies_for
@@ -70,7 +71,6 @@ from scenes.room.shared_states import with_shared_states
 from scenes.room.solar import seasonal_outdoors
 from scenes.room.spectral import eye_illuminances
 from scenes.room.zone import room_zone, zone_surfaces
-from scenes.room_views import eyes_of
 from scenes.run.first_plan import FROM, OnPlan, first_plan
 from scenes.run.options import JobOptions
 from thermal.errors import ThermalInputError
@@ -160,47 +160,6 @@ def lights_of(room: RoomInputs, traced: RoomLight, operated: Iterable[int]) -> l
         sun = np.sum(direct, axis=0) if direct else np.zeros_like(opened[own])
         found.append(GridLight(points[own], year(opened[own]), year(sun), factor[own], blinds, closed, free))
     return found
-
-
-def seat_glare(
-    room: RoomInputs,
-    light: RoomLight,
-    state: NDArray[np.int64] | None,
-    *,
-    grid: float | None,
-    directions: int,
-    eye_height: float,
-    progress: Progress = silent,
-) -> SeatGlare:
-    """DGP of every hour of use at each seat of a room.
-
-    Args:
-        state: [G, L] of the window groups in each lit hour; None: the first all year.
-        grid, directions, eye_height: of the eyes, see `scenes.room_views.eyes_of`.
-    """
-    used = working_hours(room.weather, *room.options.occupancy.hours)
-    lit = np.flatnonzero(used[room.skies.lit])
-    views = eyes_of(room.space, grid, directions, eye_height, room.options.outputs.picture_size)
-    rows = []
-    for number, each in enumerate(views):
-        steps = part(progress, number / len(views), (number + 1) / len(views), "annual glare")
-        rated = hourly_glare(
-            with_view(light.light, each.view),
-            "DGP",
-            state,
-            hours=lit,
-            options=rating_of(room.options.outputs),
-            progress=steps,
-        )
-        whole = np.zeros(room.skies.hours)
-        whole[room.skies.lit[lit]] = rated.dgp
-        rows.append(whole[used])
-    return SeatGlare(
-        np.array([each.view.position for each in views]),
-        np.array([each.view.direction for each in views]),
-        np.stack(rows),
-        state is not None,
-    )
 
 
 def seat_eye(
@@ -449,6 +408,18 @@ class Check:
         """What of glare, heat and the eye's light a rule looks at in a room."""
         return self.asked[space.guid] & {"glare", "heat", "eye"}
 
+    def _glare_limits(self, space: Space) -> frozenset[tuple[float, float]]:
+        """Limits of DGP that the criteria of a room have, each with the share of the hours that may exceed it."""
+        use = self.asked_uses[space.guid]
+        return frozenset(
+            (need.limit, need.share)
+            for rule in self.files.rules.values()
+            for criterion in rule.criterion
+            if applies(criterion, space, use)
+            for need in criterion.needs
+            if isinstance(need, DgpExceeded)
+        )
+
     def _setups(self, space: Space) -> dict[str, OperationTables | None]:
         """The operation of a room by rule, of the rules that look at its heat.
 
@@ -493,15 +464,13 @@ class Check:
         glare = None
         if self.glaring and "glare" in self._costly(space):
             with times.stage(GLARE):
-                glare = seat_glare(
-                    room,
-                    light,
-                    None if state is None else light.states(state),
-                    grid=self.options.grid,
-                    directions=self.options.directions,
-                    eye_height=self.options.eye_height,
-                    progress=progress,
-                )
+                chosen = {"eye_height": self.options.eye_height, "progress": progress}
+                if self.options.grid is None and self.options.directions == 1:
+                    glare = worst_seat_glare(room, light, state, limits=self._glare_limits(space), **chosen)
+                else:
+                    of_hours = None if state is None else light.states(state)
+                    seats = {"grid": self.options.grid, "directions": self.options.directions}
+                    glare = seat_glare(room, light, of_hours, **seats, **chosen)
         open_all = np.zeros((skies.hours, len(room.windows.groups)), dtype=np.int64)
         state = open_all if state is None else state
         heats: dict[str, RoomHeat] = {}
@@ -689,10 +658,25 @@ class Check:
 
 def glare_words(options: ComplyOptions, blinds: str) -> str:
     """How glare is rated; blinds: `blinds_words`."""
+    start, end = options.room.occupancy.hours
+    if options.grid is None and options.directions == 1:
+        return Note(
+            "Glare is rated with {blinds}, daily from {start} to {end} o'clock, at the {count} worst views of a map of "
+            "each room: eyes {spacing:g} m apart (more in rooms above {area:g} m²), {directions} directions each. Hours "
+            "in which the map's error of {error:g} may decide a limit are rated with pictures of {pixels} pixels.",
+            count=PICTURED,
+            blinds=blinds,
+            spacing=MAP_SPACING,
+            area=MAP_EYES * MAP_SPACING**2,
+            directions=MAP_DIRECTIONS,
+            error=MAP_ERROR,
+            pixels=options.room.outputs.picture_size,
+            start=start,
+            end=end,
+        )
     seats = Note("one seat in the middle of each room")
     if options.grid is not None:
         seats = Note("seats spaced {distance:g} m", distance=options.grid)
-    start, end = options.room.occupancy.hours
     return Note(
         "Glare is rated with {blinds}, {seats}, daily from {start} to {end} o'clock, with pictures of {pixels} pixels.",
         blinds=blinds,
@@ -749,6 +733,9 @@ def moved_lights(lights: RoomLights, space: Space) -> RoomLights:
     """The light of a template room for one equal to it, moved to where that stands."""
     shift = corner(space) - corner(lights.space)
     grids = {name: replace(grid, points=grid.points + shift) for name, grid in lights.grids.items()}
-    glare = lights.glare and replace(lights.glare, eyes=lights.glare.eyes + shift)
+    glare = lights.glare
+    if glare is not None:
+        plan = glare.plan and replace(glare.plan, eyes=glare.plan.eyes + shift)
+        glare = replace(glare, eyes=glare.eyes + shift, plan=plan)
     template = lights.space.label
     return replace(lights, space=space, grids=grids, glare=glare, template=template)

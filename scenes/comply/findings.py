@@ -15,6 +15,7 @@ from mitsuba_cfs.sky.matrix import sky_series
 from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.sunlight import SunExposure
 from scenes.comply.view_out import ViewOut
+from scenes.results import GlareMap
 
 FloatArray = NDArray[np.float64]
 
@@ -69,6 +70,8 @@ class SeatGlare:
     directions: FloatArray  # [V, 3] unit vectors
     dgp: FloatArray  # [V, N] daylight glare probability, 0 in the dark
     operated: bool  # blinds moved, else open all year
+    plan: GlareMap | None = None  # whose worst seats these are; None: the seats were stated
+    pictured: NDArray[np.int64] | None = None  # [V] hours of use rated by pictures; None: all
 
     def exceeded(self, limit: float) -> float:
         """Share (0 to 1) of the hours above a limit at the seat that has most of them."""

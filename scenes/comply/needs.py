@@ -471,6 +471,11 @@ class DgpExceeded(Need, parts="glare", unit="%", digits=1):
     limit: Share
 
     @property
+    def share(self) -> float:
+        """Share of the hours of use, 0 to 1, that it compares with."""
+        return self.at_most or self.at_least or 0.0
+
+    @property
     def words(self) -> str:
         """The quantity in words."""
         return gettext(

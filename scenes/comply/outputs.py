@@ -27,11 +27,13 @@ from scenes.comply.rules import NOT_MET, RuleTable
 from scenes.comply.tables import limit_of, missed, shown, values_frame
 from scenes.figures.chart import Chart, ChartMark, box
 from scenes.figures.plan import FloorPlan, plan, plan_frame
+from scenes.figures.rose import RosePlan
 from scenes.figures.scale import ColourScale, Tick
 from scenes.language.catalogue import decimal, gettext, in_language, ngettext, translated
 from scenes.language.numbers import colon, day_and_month, listed, rounded, semicolons
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
+from scenes.report.glare_figures import compass, glare_plan
 from scenes.report.names import stage_words
 from scenes.report.page import FILES as SHARED
 from scenes.report.page import environment, head_lines
@@ -228,7 +230,7 @@ def _asking(result: Compliance, room: CheckedRoom, needs: Sequence[str]) -> tupl
 
 def _glare_plans(room: CheckedRoom) -> Iterator[FloorPlan]:
     glare = None if room.light is None else room.light.glare
-    if glare is None or len(glare.eyes) == 1:
+    if glare is None or glare.plan is not None or len(glare.eyes) == 1:
         return
     eyes, seat = np.unique(glare.eyes, axis=0, return_inverse=True)
     worst = np.zeros(len(eyes))  # of the directions of each eye
@@ -316,6 +318,7 @@ class DossierRoom(RoomSection):
     tables: tuple[Table, ...]
     sun: Chart | None
     openings: Table | None
+    glare: RosePlan | None
 
 
 def dossier_html(result: Compliance, *, quick: bool = False, page: PageOptions = OWN_PAGE) -> str:
@@ -375,7 +378,27 @@ def dossier_room(result: Compliance, room: CheckedRoom, number: int) -> DossierR
         tuple(table for table in room_tables if table.rows),
         sun_bars(result, room),
         tables.openings_table(room),
+        _glare_rose(room),
     )
+
+
+def _glare_rose(room: CheckedRoom) -> RosePlan | None:
+    """The glare map of a room; None where its seats were stated, or glare is not asked for."""
+    glare = None if room.light is None else room.light.glare
+    return None if glare is None or glare.plan is None else glare_plan(room.space, glare.plan)
+
+
+def _glare_maps(result: Compliance) -> pd.DataFrame | None:
+    """The glare maps of all rooms, with the room of each row; None without any."""
+    found = []
+    for room in result.rooms:
+        glare = None if room.light is None else room.light.glare
+        if glare is not None and glare.plan is not None:
+            table = glare.plan.table()
+            table.insert(0, "room", room.space.label)
+            table.insert(1, "guid", room.space.guid)
+            found.append(table)
+    return pd.concat(found, ignore_index=True) if found else None
 
 
 def room_facts(room: CheckedRoom) -> tuple[tuple[str, str], ...]:
@@ -411,6 +434,8 @@ def room_facts(room: CheckedRoom) -> tuple[tuple[str, str], ...]:
 
 def glare_words(glare: SeatGlare) -> str:
     """The number of seats whose glare is rated, and the worst of them."""
+    if glare.plan is not None:
+        return _map_words(glare)
     seats = len(np.unique(glare.eyes, axis=0))
     directions = len(glare.eyes) // seats
     dgp = rounded(float(glare.not_exceeded().max()), 2)
@@ -428,6 +453,24 @@ def glare_words(glare: SeatGlare) -> str:
         seats,
         dgp=dgp,
     )
+
+
+def _map_words(glare: SeatGlare) -> str:
+    """The worst seat of a glare map, and how its hours are rated."""
+    seat = int(np.argmax(glare.not_exceeded()))
+    x, y, _ = glare.eyes[seat]
+    where = gettext(
+        "worst seat of the map: x {x} m, y {y} m to the {compass}; DGP exceeded in 5 % of the hours: {dgp}",
+        x=rounded(float(x), 1),
+        y=rounded(float(y), 1),
+        compass=gettext(compass(glare.directions[seat])),
+        dgp=rounded(float(glare.not_exceeded()[seat]), 2),
+    )
+    hours = 0 if glare.pictured is None else int(glare.pictured.sum())
+    if not hours:
+        return semicolons([where, gettext("decided by the map")])
+    rated = ngettext("{count} hour rated by pictures", "{count} hours rated by pictures", hours)
+    return semicolons([where, rated])
 
 
 def tied(text: str) -> str:
@@ -496,6 +539,9 @@ def write_compliance(
     """Write all files; earlier results are replaced at the end."""
     with folder.replaced() as place:
         write_table(values_frame(result), place / "values.csv", index=False, float_format="%.6g")
+        maps = _glare_maps(result)
+        if maps is not None:
+            write_table(maps, place / "glare_map.csv", index=False, float_format="%.6g")
         rows = issue_rows(result.issues, "command")
         issues = pd.DataFrame(rows, columns=list(COLUMNS))
         write_table(issues, place / "problems.csv", index=False)

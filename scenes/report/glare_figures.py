@@ -8,19 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_closing, binary_dilation, binary_erosion
 
+from bim.model import Space
+from mitsuba_cfs.glare.classes import LIMITS
 from mitsuba_cfs.images.view import View
 from scenes.figures.picture import photo_uri, png_uri, reduced
+from scenes.figures.plan import plan_frame
+from scenes.figures.rose import RosePlan, RoseWedge, roses
 from scenes.figures.scale import ColourScale
-from scenes.language.catalogue import N_, gettext, ngettext
-from scenes.language.numbers import rounded, significant, spoken
+from scenes.language.catalogue import N_, decimal, gettext, ngettext
+from scenes.language.numbers import percent, rounded, significant, spoken
 from scenes.pictures import tone_mapped
 from scenes.report.tables import GLARE_WORDS, glare_class
-from scenes.results import GlareResults, LuminancePicture, RoomYear, RunResult
+from scenes.results import GlareMap, GlareResults, LuminancePicture, RoomYear, RunResult
 
 MOST_PICTURES = 4  # the worst ones; the table has them all
 MOST_OF_A_RUN = 24  # shared by its rooms, so that the file stays small
 LARGEST_SIDE = 620  # [px] of a picture in the page
 MANY_ROOMS, SIDE_OF_MANY = 10, 240  # beyond so many rooms [px]
+ROSE = 0.47  # radius of a rose, over the distance between eyes
 BRIDGE = 4  # slits up to twice as many pixels wide do not split an outline
 COMPASS = (
     N_("north"),
@@ -84,6 +89,46 @@ def gallery(result: RunResult, room: RoomYear) -> GlareGallery | None:
     cut = many and max(chosen[0].luminance.shape) > side
     left, colour = len(pictures) - len(chosen), colour_view(result, room.glare, side)
     return GlareGallery(shown, scale, left, side if cut else 0, colour)
+
+
+def glare_plan(space: Space, year: GlareMap) -> RosePlan:
+    """The plan of a room with a rose at each eye: hours of use above each limit by direction of view."""
+    frame = plan_frame(space, year.eyes)
+    wedges = [
+        RoseWedge(eye[:2], way[:2], tuple(year.shares[:, e, n]), _wedge_words(year, e, n))
+        for e, eye in enumerate(year.eyes)
+        for n, way in enumerate(year.directions)
+    ]
+    box, body = roses(frame, wedges, ROSE * year.spacing, len(year.directions))
+    (e, n), limit = year.worst()[0], LIMITS[-1]
+    text = gettext(
+        "Seated eyes {height} m above the floor, {spacing} m apart, {directions} directions each, with the shading of "
+        "each hour. The coloured part of a wedge's area is the share of the {hours} hours of use above each limit of "
+        "DGP; the pale wedge represents all of them. North is up. Worst view: x {x} m, y {y} m to the {compass}, "
+        "DGP above {limit} in {share} % of the hours. Computed without pictures from the illuminance at the eye, the "
+        "windows' luminance and the sun's disc.",
+        height=rounded(float(year.eyes[0, 2]) - space.floor_level, 1),
+        spacing=rounded(year.spacing, 1),
+        directions=len(year.directions),
+        hours=rounded(year.hours_of_use, 0),
+        x=rounded(float(year.eyes[e, 0]), 1),
+        y=rounded(float(year.eyes[e, 1]), 1),
+        compass=gettext(compass(year.directions[n])),
+        limit=rounded(limit, 2),
+        share=percent(100 * float(year.shares[-1, e, n])),
+    )
+    limits = tuple(rounded(limit, 2) for limit in LIMITS)
+    return RosePlan(gettext("Glare by direction of view"), text, *box, body, limits)
+
+
+def _wedge_words(year: GlareMap, e: int, n: int) -> str:
+    """The hours of use above each limit of one view."""
+    where = decimal(f"x {year.eyes[e, 0]:.1f} m, y {year.eyes[e, 1]:.1f} m").replace(", y", "; y")
+    hours = ", ".join(
+        gettext("{hours} h above {limit}", hours=rounded(year.hours_of_use * share, 0), limit=rounded(limit, 2))
+        for limit, share in zip(LIMITS, year.shares[:, e, n].tolist(), strict=True)
+    )
+    return f"{where}; {gettext(compass(year.directions[n]))}: {hours}"
 
 
 def colour_view(result: RunResult, glare: GlareResults, side: int) -> ColourView | None:

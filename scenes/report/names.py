@@ -61,6 +61,7 @@ STAGES = {  # whose seconds are noted
     "daylight": N_("daylight"),
     "holes": N_("check for leaks"),
     "annual glare": N_("annual glare"),
+    "glare map": N_("glare map"),
     "glare": N_("glare"),
     "pictures": N_("pictures"),
     "colour": N_("colour picture"),

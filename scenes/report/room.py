@@ -12,6 +12,7 @@ from bim.model import Space
 from scenes.figures.carpet import carpet, class_carpet
 from scenes.figures.chart import Chart, ChartMark, box
 from scenes.figures.plan import FloorPlan
+from scenes.figures.rose import RosePlan
 from scenes.figures.scale import ColourScale, round_limits
 from scenes.language.catalogue import N_, gettext, ngettext, translated
 from scenes.language.numbers import percent, rounded, share
@@ -185,6 +186,7 @@ class RoomPage(RoomSection):
     glare: glare_figures.GlareGallery | None
     glare_table: tables.Table | None
     glare_year: Chart | None
+    glare_plan: RosePlan | None
     spectral: spectral_figures.SpectralFigures | None
     temperature: Chart
     comfort: Chart | None
@@ -217,6 +219,7 @@ def room_page(result: RunResult, room: RoomYear, number: int) -> RoomPage:
         glare=glare_figures.gallery(result, room),
         glare_table=tables.glare_table(result.times, room.glare.pictures) if room.glare.pictures else None,
         glare_year=glare_carpet(result, room),
+        glare_plan=None if room.glare_map is None else glare_figures.glare_plan(room.space, room.glare_map),
         spectral=spectral_figures.spectral_figures(result, room),
         temperature=thermal_figures.temperature_carpet(result, room),
         comfort=thermal_figures.comfort_carpet(result, room),

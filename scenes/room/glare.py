@@ -18,19 +18,21 @@ from mitsuba_cfs.glare.evaluation import GlareOptions
 from mitsuba_cfs.matrices.cache import CacheEntry, digest
 from mitsuba_cfs.methods.colour_view import coloured_picture, has_colour
 from mitsuba_cfs.methods.glare import hourly_glare, rated_pictures
+from mitsuba_cfs.methods.glare_map import glare_of_eyes
 from mitsuba_cfs.methods.optics import States
 from mitsuba_cfs.methods.phase_light import PhaseLight
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.methods.sun_by_patches import sunny_hour_dgp_error
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky
-from scenes.results import DGP_SUNNY_HOUR_ERROR, ColourPicture, GlareResults, LuminancePicture
+from scenes.results import DGP_SUNNY_HOUR_ERROR, ColourPicture, GlareMap, GlareResults, LuminancePicture
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight, picture_light
 from scenes.room.options import Outputs
 from scenes.room.picture_hours import hour_index
 from scenes.room.surface_spectra import in_stated_colours
 from scenes.room.windows import RoomWindows
+from scenes.room_views import eyes_of
 
 COLUMNS = {
     "dgp": "dgp",
@@ -40,6 +42,11 @@ COLUMNS = {
     "ugr": "ugr",
     "sources": "sources",
 }
+MAP_SPACING = 1.0  # of the eyes of a glare map [m], at least
+MAP_EYES = 64  # of a room, about: larger rooms have a wider spacing
+MAP_DIRECTIONS = 8  # of view at each eye
+MAP_SIZE = 16  # pixels of its views, of which no picture is made
+EYE_HEIGHT = 1.2  # of a seated person above the floor [m], EN 17037
 WORST = 4  # pictures of a rated year without hours asked for
 DEFAULT_DAYS = ((3, 21), (6, 21), (12, 21))  # month, day
 DEFAULT_CLOCK = (9, 12, 15)  # the hour that begins then, local standard time
@@ -105,6 +112,32 @@ def rated_hours_error(
         hours=np.searchsorted(room.skies.lit, hours),
         options=rating_of(room.options.outputs),
     )
+
+
+def glare_map(
+    room: RoomInputs,
+    light: RoomLight,
+    state: NDArray[np.int64],
+    *,
+    eye_height: float = EYE_HEIGHT,
+    progress: Progress = silent,
+) -> tuple[GlareMap, NDArray[np.float32]]:
+    """DGP over the room by direction in the hours of use, and of each of these hours [E, N, U].
+
+    Eyes are 0.5 m or more from the walls, their directions at equal angles from that to the largest
+    window.
+
+    Args: state: [H, G] of the shading.
+    """
+    spacing = max(MAP_SPACING, float(np.sqrt(room.space.floor_area / MAP_EYES)))
+    views = [each.view for each in eyes_of(room.space, spacing, MAP_DIRECTIONS, eye_height, MAP_SIZE)]
+    eyes = np.array([view.position for view in views[::MAP_DIRECTIONS]])
+    directions = np.array([view.direction for view in views[:MAP_DIRECTIONS]])
+    rated = glare_of_eyes(light.light, eyes, directions, light.states(state), progress=progress)
+    year = np.zeros((*rated.shape[:2], room.skies.hours), dtype=np.float32)
+    year[..., room.skies.lit] = rated
+    used = year[..., room.occupied]
+    return GlareMap.of(eyes, directions, used, spacing=spacing, step_h=room.weather.step_h), used
 
 
 def worst_hours(year: pd.DataFrame, count: int) -> list[int]:

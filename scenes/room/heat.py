@@ -22,6 +22,7 @@ from scenes.results import (
     Bands,
     DaylightResult,
     ExploredRoom,
+    GlareMap,
     GlareResults,
     OperationResult,
     RoomYear,
@@ -215,6 +216,7 @@ class DaylitRoom:
     as_lobe: dict[str, float] = field(default_factory=dict)
     issues: tuple[Issue, ...] = ()
     explored: ExploredRoom | None = None
+    glare_map: GlareMap | None = None
     template: str = ""
     borrowed: str = ""
 

@@ -44,7 +44,7 @@ from scenes.fenestration.systems import States
 from scenes.results import ExploredRoom, GlareResults, RoomYear, ShadingYear
 from scenes.room.control_hour import controlled_states
 from scenes.room.daylight import room_daylight
-from scenes.room.glare import annual_glare, coloured, rated_hours, rated_hours_error, rating_of, room_glare
+from scenes.room.glare import annual_glare, coloured, glare_map, rated_hours, rated_hours_error, rating_of, room_glare
 from scenes.room.heat import DaylitRoom, heat_alone
 from scenes.room.inner_glass import borrowed_share
 from scenes.room.inputs import FileSensors, RoomInputs, room_inputs
@@ -197,7 +197,7 @@ def lit_room(
         message = "the explorer knows one state of the trees: give them one transmittance"
         raise DataError(message, file=building.file, field="--explore")
     hours = wanted_hours(options.outputs.picture_hours, weather.midpoints, room.skies.lit)
-    year = dgp = rated = explored = spectral = sensitivities = samples = None
+    year = dgp = rated = explored = spectral = sensitivities = samples = plan = None
     dgp_error = 0.0
     times = StageTimes()
 
@@ -213,6 +213,9 @@ def lit_room(
     if options.outputs.annual_glare:
         with times.stage("annual glare"):
             year = annual_glare(room, light, state, progress=progress)
+        if space.windows and room.occupied.any():
+            with times.stage("glare map"):
+                plan, _ = glare_map(room, light, state, progress=progress)
     glare = GlareResults(light.scene.view, (), rating_of(options.outputs).rule)
     if pictures:
         with times.stage("glare"):
@@ -258,6 +261,7 @@ def lit_room(
         as_lobe=as_lobe,
         issues=leaks,
         explored=explored,
+        glare_map=plan,
         borrowed=borrowed_share(space, light.light, light.inner),
     )
 

@@ -108,9 +108,11 @@ def moved_result(result: Moved, space: Space) -> Moved:
     explored = result.explored
     if explored is not None:
         explored = replace(explored, windows=tuple(one + shift for one in explored.windows))
+    plan = result.glare_map and replace(result.glare_map, eyes=result.glare_map.eyes + shift)
     return replace(
         result,
         space=space,
+        glare_map=plan,
         daylight=replace(daylight, points=daylight.points + shift, sensor_metrics=table),
         glare=replace(glare, view=replace(glare.view, position=eye)),
         seconds={},

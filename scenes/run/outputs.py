@@ -159,6 +159,8 @@ def _write_room(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
         _write_shading(room, times, place)
     if room.annual_glare is not None:
         _csv(room.annual_glare, place / "annual_glare.csv")
+    if room.glare_map is not None:
+        _csv(room.glare_map.table(), place / "glare_map.csv", index=False)
     if room.spectral is not None:
         _csv(room.spectral.eye, place / "melanopic.csv")
         sensors = metrics[list("xyz")].join(room.spectral.sensor_metrics)

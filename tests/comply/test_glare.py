@@ -11,8 +11,8 @@ from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.sky.epw import read_epw
 from scenes.comply.blinds import open_and_closed
-from scenes.comply.comply import seat_glare
 from scenes.comply.findings import SeatGlare
+from scenes.comply.glare import open_hours, seat_glare, worst_seat_glare
 from scenes.comply.needs import DgpExceeded
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
@@ -39,8 +39,8 @@ def test_eyes_all_over_a_room():
     assert len(eyes_of(space, None, 1, 1.2, 64)) == 1
 
 
-@pytest.mark.slow
-def test_seats_and_blinds(variant):
+def clear_room():
+    """A room with a clear window to the south, which a second state closes; its inputs and light."""
     weather = read_epw(WEATHER)
     building = shoebox(3.0, 4.0, windows=[WindowRectangle(0.5, 0.8, 2.0, 1.8)])
     space = building.spaces[0]
@@ -60,6 +60,13 @@ def test_seats_and_blinds(variant):
     skies = skies.part(np.arange(0, len(skies.lit), EVERY))
     room = room_inputs(building, space, systems, weather, options, skies=skies)
     light = room_light(room)
+    return room, light
+
+
+@pytest.mark.slow
+def test_seats_and_blinds(variant):
+    room, light = clear_room()
+    weather, options, skies = room.weather, room.options, room.skies
     chosen = {"directions": 1, "eye_height": 1.2}
     one = seat_glare(room, light, None, grid=None, **chosen)
     used = working_hours(weather, *options.occupancy.hours)
@@ -83,3 +90,38 @@ def test_the_worst_seat_counts():
     need = DgpExceeded(what="dgp_exceeded", limit=0.45, at_most=0.05)
     assert not need.met(seats.exceeded(need.limit))
     np.testing.assert_array_equal(seats.not_exceeded(), [0.5, 0.6])
+
+
+def test_pictures_are_for_hours_that_may_decide():
+    """A limit that the worst seat misses or keeps by more than the error needs none."""
+    limits = [(0.45, 0.25)]
+    sure = np.array([[0.2, 0.46, 0.6, 0.7], [0.2, 0.2, 0.44, 0.46]])
+    assert not open_hours(sure, limits, 0.03).any()  # 0.6 is exceeded in a quarter of the hours
+    assert not open_hours(np.full((2, 4), 0.41), limits, 0.03).any()
+    close = np.array([[0.2, 0.43, 0.44, 0.7], [0.2, 0.3, 0.41, 0.47]])
+    found = open_hours(close, limits, 0.03)
+    np.testing.assert_array_equal(found, [[False, True, True, False], [False] * 4])
+    # both limits of a rule
+    assert open_hours(close, [(0.45, 0.25), (0.4, 0.25)], 0.03)[1].tolist() == [False, False, True, False]
+
+
+@pytest.mark.slow
+def test_the_worst_seat_of_a_map_is_rated_by_pictures(variant):
+    """A clear window to the south: the worst view is near it and sees the sun; pictures decide open hours."""
+    room, light = clear_room()
+    every = worst_seat_glare(room, light, None, limits=[(0.45, 0.05)], eye_height=1.2)
+    assert every.plan is not None and every.pictured is not None and not every.operated
+    shares = every.plan.shares
+    assert (shares[0] >= shares[1]).all() and (shares[1] >= shares[2]).all()
+    (e, n), *_ = every.plan.worst()
+    assert every.plan.not_exceeded[e, n] == every.plan.not_exceeded.max()
+    np.testing.assert_allclose(every.eyes[0], every.plan.eyes[e])
+    table = every.plan.table()
+    assert len(table) == shares[0].size and table["hours_above_0.40"].max() <= table["hours_of_use"].iloc[0]
+    # a limit at what the worst seat has of the map is open: its hours are pictures
+    level = float(every.plan.not_exceeded.max())
+    tight = worst_seat_glare(room, light, None, limits=[(level, 0.05)], eye_height=1.2)
+    assert tight.pictured.sum() > 0
+    closed = np.ones((room.skies.hours, len(room.windows.groups)), dtype=np.int64)
+    dim = worst_seat_glare(room, light, closed, limits=[], eye_height=1.2)
+    assert dim.operated and dim.pictured.sum() == 0 and dim.dgp.mean() < every.dgp.mean()

@@ -16,13 +16,14 @@ from matplotlib.text import Text
 from mitsuba_cfs.glare.evaluation import evaluate
 from mitsuba_cfs.images.view import fisheye
 from scenes.figures.plan import plan_frame
+from scenes.figures.rose import RoseWedge, roses
 from scenes.head import NO_HEAD
 from scenes.language.catalogue import in_language
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.pictures import write_check_picture
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.outputs import write_heat_map
-from scenes.year_of_glare.page import RoseWedge, roses, write_page
+from scenes.year_of_glare.page import write_page
 from tests.devtools import Page, chromium
 from tests.report.synthetic import two_rooms
 

@@ -176,6 +176,20 @@ class SpecularScattering:
         return self._beam.at(sun)
 
 
+class OpenWindow:
+    """A window with nothing in it: all of the beam passes, and nothing is scattered."""
+
+    key = "open window"
+
+    def scattered(self, sun: mi.Vector3f, outward: mi.Vector3f) -> mi.Float:
+        """See `Scattering`."""
+        return dr.zeros(mi.Float, dr.width(sun))
+
+    def through(self, sun: mi.Vector3f) -> mi.Float:
+        """See `Scattering`."""
+        return dr.full(mi.Float, 1.0, dr.width(sun))
+
+
 class AngularScattering:
     """Transmission by the angle of incidence alone: a straight beam and diffuse light."""
 

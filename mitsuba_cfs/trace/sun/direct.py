@@ -23,7 +23,7 @@ from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, cache_entry
 from mitsuba_cfs.trace.kernels.sampling import batch_key, column, lattice, lattice_2d, opaque, opaque_vector, vectors
-from mitsuba_cfs.trace.kernels.scattering import Scattering
+from mitsuba_cfs.trace.kernels.scattering import OpenWindow, Scattering
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 from mitsuba_cfs.trace.sun.specular_paths import (
     CLEAR,
@@ -316,6 +316,50 @@ def direct_sun_matrix(
             stopping=stopping,
         ),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class VisibleSuns:
+    """How much of the sun's disc eyes see through each window group, by one specular path."""
+
+    directions: NDArray[np.float64]  # [Q, 3] apparent directions to the centres of the discs
+    share: NDArray[np.float32]  # [G, S, Q] of the disc, times the reflectance of mirrors on the path
+
+
+def visible_suns(
+    interior: Surfaces,
+    exterior: Surfaces,
+    groups: Sequence[WindowGroup],
+    points: ArrayLike,
+    suns: ArrayLike,
+    *,
+    seed: int = 0,
+    scenes: SceneCache | None = None,
+) -> list[VisibleSuns]:
+    """Shares of the suns' discs that eyes see through the openings, whatever fills these.
+
+    A sun below the horizon, such as one mirrored by water, is left out.
+
+    Args:
+        points: [S, 3] eyes [m]; suns: [Q, 3] directions to the centres of the discs.
+        interior, exterior, groups, scenes: as of `direct_sun_matrix`.
+    """
+    scenes = SceneCache() if scenes is None else scenes
+    points = np.atleast_2d(np.asarray(points, dtype=float))
+    suns = normalize(np.atleast_2d(np.asarray(suns, dtype=float)))
+    inside = scenes.scene(interior, groups)
+    outside = scenes.scene(exterior, groups, windows_block=False)
+    place = vectors(points - inside.centre, mi.Point3f)
+    upwards = vectors(np.tile([0.0, 0.0, 1.0], (len(points), 1)))
+    found, key = [], column([batch_key(seed, 0)[0]], mi.UInt32)
+    for way in specular_sun_paths(outside):
+        apparent = way.apparent(suns)
+        around = SunScene(inside, way, place, upwards, vectors(apparent))
+        by_cosine = SunDiscs(around, [OpenWindow()] * len(groups), seed).light(key)
+        height = np.maximum(apparent[:, 2], SPREAD)
+        shares = np.stack([one.reshape(len(points), len(suns)) / height for one in by_cosine])
+        found.append(VisibleSuns(apparent, np.minimum(shares, 1.0).astype(np.float32)))
+    return found
 
 
 def _window_points(around: SunScene, group: int, count: int, keys: mi.UInt32) -> _Points:
