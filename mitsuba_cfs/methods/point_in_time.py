@@ -21,6 +21,7 @@ from mitsuba_cfs.trace.paths.scene import PathTracingScene, Sky
 from mitsuba_cfs.trace.pictures.point_in_time import point_in_time_picture
 
 BATCHES = 16  # of the paths of a sensor in an hour
+EYE_PATHS = 16  # paths of the eye for each of a sensor: DGP depends on it, and it is a single point
 Array = NDArray[np.float64]
 State = NDArray[np.int64]
 
@@ -97,7 +98,7 @@ def path_eye_illuminance(light: PathLight, hours: NDArray[np.int64], state: Stat
     rooms = rooms_by_state(light, rows)
     return np.array(
         [
-            float(_sensors(light, rooms[tuple(now.tolist())], point, direction, hour)[0][0])
+            float(_sensors(light, rooms[tuple(now.tolist())], point, direction, hour, EYE_PATHS)[0][0])
             for hour, now in zip(hours.tolist(), rows.T, strict=True)
         ]
     )
@@ -141,16 +142,19 @@ def path_sky(light: PathLight, hour: int) -> Sky:
 
 
 def _sensors(
-    light: PathLight, room: PathTracingScene, points: Array, directions: Array, hour: int
+    light: PathLight, room: PathTracingScene, points: Array, directions: Array, hour: int, more: int = 1
 ) -> tuple[Array, Array]:
-    """Illuminance [S] of some sensors in one hour and its variance, from batches of paths."""
+    """Illuminance [S] of some sensors in one hour and its variance, from batches.
+
+    Args: more: paths of each for one of `Sampling.hour_samples`.
+    """
     chosen = light.sampling
     batch = sensor_batches(
         room,
         path_sky(light, hour),
         np.repeat(points, BATCHES, axis=0),  # all batches in one launch
         np.repeat(directions, BATCHES, axis=0),
-        samples=max(chosen.hour_samples // BATCHES, 1),
+        samples=max(more * chosen.hour_samples // BATCHES, 1),
         max_depth=MAX_DEPTH,
         seed=chosen.seed * light.sky.hours + int(light.sky.lit[hour]),  # hours differ
     )

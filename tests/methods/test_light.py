@@ -76,6 +76,20 @@ def test_without_a_view_the_eye_and_its_glare_are_refused(method) -> None:
             call(light)
 
 
+def test_paths_of_an_eye_have_a_quarter_of_a_sensors_noise() -> None:
+    """With as few paths as a sensor, the DGP of an hour by its illuminance was up to 13 % too high."""
+    at_eye = replace(scene(), points=np.atleast_2d(VIEW.position), normals=np.atleast_2d(VIEW.direction))
+    by_eye, by_sensor = [], []
+    for seed in range(16):
+        paths = replace(FEW, hour_samples=256, seed=seed)
+        light = daylight(at_eye, glass(), SKY, method="point-in-time", sampling=paths)
+        by_eye.append(eye_illuminance(light)[0])
+        by_sensor.append(illuminance(light)[0, 0])
+    noise = np.std(by_eye, ddof=1), np.std(by_sensor, ddof=1)
+    assert np.mean(by_eye) == pytest.approx(np.mean(by_sensor), abs=3 * noise[1] / 4)
+    assert noise[0] < 0.5 * noise[1]
+
+
 def test_another_eye_shares_what_depends_on_the_windows_alone() -> None:
     light = daylight(scene(), glass(), SKY, sampling=FEW)
     other = with_view(light, replace(VIEW, position=(1.0, 3.0, 1.2)))
