@@ -43,6 +43,8 @@ MOST_KNOWN = 64  # evaluations that are kept
 LEAST_OFFSET = 1e-5  # of a light meter whose tracing states no noise
 OFF_SURFACE = 0.002  # [m] of a sensor that stands for a surface
 LONE = SensorGrid(spacing=1e3)  # the least grid: one sensor of the work plane
+# Paths of a light meter and of a window's patches, where the study states none: its noise is the same in all hours
+METER_PATHS = {"sensor_samples": 131_072, "patch_samples": 16_384}
 ALBEDO = ("albedo", "measured.albedo")
 # keys of a box, and the groups of surfaces by which light is derived
 OF_GROUPS = {"box.reflectance.floor": "floor", "box.reflectance.wall": "walls", "box.reflectance.ceiling": "ceiling"}
@@ -289,7 +291,9 @@ class FittedModel:
             for (_, one), point, d in zip(own, points, directions, strict=True)
         ]
         points = points + OFF_SURFACE * directions * np.array([[face is not None] for face in faces])
-        options = study.options.changed(sensitivities=slopes is not None)
+        stated = study.trace.model_fields_set
+        paths = {name: count for name, count in METER_PATHS.items() if name not in stated}
+        options = study.options.changed(sensitivities=slopes is not None, **paths)
         room = room_inputs(
             inputs.building,
             space,

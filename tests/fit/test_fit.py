@@ -150,6 +150,17 @@ def test_light_comes_back_from_its_own_tracing(tmp_path):
     assert (model.whole_derivatives(fit.mean) > 0).mean() > 0.98
 
 
+@pytest.mark.slow
+def test_the_noise_of_a_light_meter_is_small_unless_its_paths_are_stated(tmp_path):
+    """With a study's 16,384 paths the noise was as large as what 55 readings with errors of 5 % tell."""
+    models = [FittedModel(planted_fit(tmp_path / str(paths), "light", paths=paths)) for paths in (None, 2048)]
+    for model in models:
+        model.whole_derivatives(model.fit.mean)
+    few, many = (np.array(list(model.tracing_error.values())) for model in reversed(models))
+    told = 0.05 / np.sqrt(55)  # what 55 readings with errors of 5 % tell of their mean
+    assert many.max() < told < 0.5 * few.max()
+
+
 def test_luminance_of_a_wall_is_its_reflectance_times_illuminance(tmp_path):
     fit = planted_fit(tmp_path, "light", paths=2048)
     text = fit.file.read_text()
