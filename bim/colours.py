@@ -32,7 +32,7 @@ def linear_of_display(colour: Sequence[float]) -> Colour:
 def hue_of(linear: Sequence[float]) -> Colour:
     """The colour of luminance 1; that of black is grey."""
     whole = luminance(linear)
-    if whole <= 0:
+    if whole <= 0 or min(linear) == max(linear):  # a division of equal numbers need not give 1
         return GREY
     red, green, blue = (value / whole for value in linear)
     return red, green, blue

@@ -395,7 +395,7 @@ class Project:
         for one in study.get("system", []):
             path = self.folder / one.get("operation", "")
             if path.parent == self.folder / INPUTS and path.name.startswith(OPERATED):
-                kept = {k: v for k, v in read_table(path).items() if k not in ("loads", "gains")}
+                kept = {k: v for k, v in _finite_table(path).items() if k not in ("loads", "gains")}
                 write_table(path, kept | operation, head=WRITTEN)
 
     def _change_uses(self, _study: dict[str, Any], value: Any) -> None:
@@ -403,7 +403,7 @@ class Project:
         if not isinstance(value, dict):
             raise DataError("expected a table", field="uses")
         path = self.folder / USES
-        table = read_table(path) if path.is_file() else {}
+        table = _finite_table(path) if path.is_file() else {}
         rooms = dict(table.get("rooms", {}))
         for guid, use in value.items():
             rooms[guid] = _text(use, "uses") if use else ""
@@ -420,7 +420,7 @@ class Project:
             raise DataError("corrections are of IFC files", field="corrections")
         path = corrections_file(self.folder / files[0])
         before = path.read_text(encoding="utf-8") if path.is_file() else None
-        table = read_table(path) if before is not None else {}
+        table = _finite_table(path) if before is not None else {}
         if not isinstance(value, dict) or not set(value) <= {"north", "outdoors", "indoors"}:
             raise DataError("expected north, outdoors or indoors", field="corrections")
         if "north" in value:

@@ -30,7 +30,6 @@ FloatArray = NDArray[np.float64]
 
 VSC_PERCENT, RATIO = 27.0, 0.8
 APSH_PERCENT, WINTER_PERCENT, APSH_LOSS = 25.0, 5.0, 4.0
-WORKING_PLANE = 0.85  # of dwellings [m]
 GRID = 0.25  # of its points [m]
 SKY_STEP_DEG = 1.5  # of the sky that VSC adds up
 DEEPEST_REVEAL, REVEAL_STEP = 0.6, 0.02  # outside the glass [m]
@@ -75,7 +74,7 @@ def window_table(before: Site, after: Site, sun: SunYear) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def room_table(before: Site, after: Site, *, height: float = WORKING_PLANE) -> pd.DataFrame:
+def room_table(before: Site, after: Site, *, height: float) -> pd.DataFrame:
     """Share of each room's working plane with a view of the sky, before and after, and whether the guide is met."""
     rows = []
     for space in before.building.spaces:

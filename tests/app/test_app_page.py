@@ -217,7 +217,9 @@ def test_windows_without_glazing_data_are_named_before_a_command_refuses_them(tm
         page.open(served.address)
         choose(page, "#drop", bare, WEATHER)
         go(page, "compute")
-        page.until(f"{ready} && document.getElementById('plan-fault').textContent.startsWith('2 windows of the chosen')")
+        page.until(
+            f"{ready} && document.getElementById('plan-fault').textContent.startsWith('2 windows of the chosen')"
+        )
         assert page.value("document.getElementById('start').disabled")
         assert page.value("document.querySelector('nav [href=\"#systems\"] .mark').className") == "mark doubt"
         go(page, "systems")

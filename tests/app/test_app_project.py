@@ -411,3 +411,21 @@ def test_a_value_of_another_kind_is_one_line(project, file, text) -> None:
     (project.folder / file).write_text(text)
     with pytest.raises(DataError, match=f"{file}: .*: expected "):
         project.study(), project.operation(), project.uses()
+
+
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        ("uses.toml", {"uses": {"guid": "office"}}),
+        ("inputs/office.corrections.toml", {"corrections": {"outdoors": ["guid"]}}),
+        ("inputs/controlled blind.toml", {"loads": {"heating_c": 21}}),
+    ],
+)
+def test_a_change_to_a_file_with_a_number_that_is_not_finite_is_refused(project, name, change) -> None:
+    """The page could not be answered with it."""
+    (project.folder / name).write_text("north = nan\n", encoding="utf-8")
+    if "controlled" in name:
+        project.write_study(project.study() | {"system": [{"name": "blind", "operation": name}]})
+    with pytest.raises(DataError, match="expected a finite number"):
+        project.change(change)
+    assert (project.folder / name).read_text("utf-8") == "north = nan\n"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bim.colours import GREY, TO_RADIANCE, hue_of, luminance, radiance_colour
+from bim.colours import GREY, TO_RADIANCE, hue_of, linear_of_display, luminance, radiance_colour
 from bim.ifc.building import read_ifc
 from bim.to_radiance import LUMINANCE, write_radiance
 from tests.bim.small_ifc import box_room
@@ -41,7 +41,7 @@ def test_a_colour_reflects_as_much_as_the_grey(reflectance, linear):
 
 
 def test_black_has_no_hue():
-    assert hue_of((0.0, 0.0, 0.0)) == GREY
+    assert all(hue_of(linear_of_display((v / 255,) * 3)) == GREY for v in range(256))
     assert luminance(hue_of(BRICK)) == pytest.approx(1.0)
 
 

@@ -24,6 +24,7 @@ from tests.comply.test_outputs import RULE, files_of
 from tests.devtools import Page, chromium
 from tests.explore.synthetic import explored_run
 from tests.report.building_page import building
+from tests.report.other_pages import write_check_page, write_design_page, write_fit_page
 from tests.report.synthetic import run_result
 from tests.report.test_glare_page import write_glare_page
 from tests.report.test_study_explorer import with_explored
@@ -69,6 +70,7 @@ def pages(tmp_path_factory) -> dict[str, Path]:
     write_explorer(explored_run(), folder / "explorer")
     write_glare_page(folder / "glare.html")
     files = {name: folder / f"{name}.html" for name in (*texts, "glare")}
+    files |= {"check": write_check_page(folder), "fit": write_fit_page(folder), "design": write_design_page(folder)}
     return files | {"explorer": folder / "explorer" / "index.html"}
 
 
@@ -93,6 +95,19 @@ def test_no_page_has_a_serious_fault(pages, tmp_path, flags) -> None:
         found = {name: faults(page, file) for name, file in pages.items() if width > 390 or name != "building"}
     grave = {name: [f for f in some if f[0] in GRAVE] for name, some in found.items()}
     assert not {name: some for name, some in grave.items() if some}
+
+
+@pytest.mark.parametrize("width", [1440, 390])
+def test_no_script_has_a_fault_and_nothing_is_wider_than_the_window(pages, tmp_path, width) -> None:
+    with Page(tmp_path, width=width) as page:
+        for name, file in pages.items():
+            page.open(file.as_uri(), ready="document.readyState === 'complete'")
+            page.until("new Promise((on) => setTimeout(() => on(true), 300))")  # scripts that begin late
+            assert page.faults == [], name
+            assert page.value("document.documentElement.scrollWidth") <= width, name
+            saves = page.value("[...document.querySelectorAll('button.figures')].filter((one) => !one.hidden).length")
+            figures = page.value("document.querySelectorAll('[data-figure] .save, .save').length")
+            assert saves == 0 or figures, name
 
 
 def test_a_planted_fault_is_seen(pages, tmp_path) -> None:

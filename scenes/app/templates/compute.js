@@ -23,10 +23,11 @@ async function plan() {
     planned = [];
     fault = error.message;
   }
-  if (lacking && !fault) fault = unfilledText(lacking);
   const button = byId("start");
   button.disabled = !planned.length || lacking > 0;
-  byId("plan-fault").textContent = fault || (planned.length ? "" : gettext("Choose what to compute."));
+  fill(byId("plan-fault"), lacking && !fault
+    ? [`${unfilledText(lacking)} `, h("a", { href: "#systems" }, gettext("Systems of the windows"))]
+    : fault || (planned.length ? "" : gettext("Choose what to compute.")));
   fill(byId("plan"), planned.map((one) => h("li", {}, commandLine(one.command))));
   byId("plan-count").textContent = ngettext("{count} command", "{count} commands", planned.length);
 }

@@ -73,8 +73,8 @@ export function commandLine(text) {
 
 // What the building's file lacks, before a command refuses it
 export const unfilledText = (count) => cfs.ngettext(
-  "{count} window of the chosen rooms has no glazing data in the building's file: choose a system in step 3.",
-  "{count} windows of the chosen rooms have no glazing data in the building's file: choose a system in step 3.", count);
+  "{count} window of the chosen rooms has no glazing data in the building's file: choose a system.",
+  "{count} windows of the chosen rooms have no glazing data in the building's file: choose a system.", count);
 
 // Say something to all who listen: a fault stays until it is closed
 export function notice(text, kind = "fault") {
