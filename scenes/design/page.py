@@ -122,7 +122,7 @@ def certainty(result: DesignResult) -> tuple[str, ...]:
         noise = float(np.hypot(result.errors[0][number], result.errors[1][number]))
         words = {
             "measure": inside(gettext(objective.measure.label)),
-            "difference": _with_unit(abs(difference), objective),
+            "difference": f"{significant(abs(difference), 2)} {objective.measure.unit}".strip(),
             "error": f"{significant(noise, 2)} {objective.measure.unit}".strip(),
         }
         if difference == 0 and noise == 0:

@@ -16,10 +16,7 @@ DOUBTS = ("loss", "warning", "assumption")
 
 
 def check_record(
-    building: Building,
-    head: Sequence[str],
-    uses: Mapping[str, tuple[str, str, bool]],
-    glazing: Mapping[str, str],
+    building: Building, head: Sequence[str], uses: Mapping[str, tuple[str, str, bool]], glazing: Mapping[str, str]
 ) -> dict[str, Any]:
     """What `cfs check --json` writes: site, head, rooms, issues, and the 3D model of the viewer.
 
@@ -50,10 +47,7 @@ def check_record(
 
 
 def _room(
-    space: Space,
-    issues: Iterable[Issue],
-    uses: Mapping[str, tuple[str, str, bool]],
-    glazing: Mapping[str, str],
+    space: Space, issues: Iterable[Issue], uses: Mapping[str, tuple[str, str, bool]], glazing: Mapping[str, str]
 ) -> dict[str, Any]:
     elements = {space.guid, space.label, space.name, *(w.guid for w in space.windows)}
     elements |= {face.element for face in space.faces if face.element is not None}
