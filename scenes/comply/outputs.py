@@ -460,7 +460,7 @@ def _map_words(glare: SeatGlare) -> str:
     seat = int(np.argmax(glare.not_exceeded()))
     x, y, _ = glare.eyes[seat]
     where = gettext(
-        "worst seat of the map: x {x} m, y {y} m to the {compass}; DGP exceeded in 5 % of the hours: {dgp}",
+        "worst view of the map: x {x} m, y {y} m, looking {compass}; DGP exceeded in 5 % of the hours: {dgp}",
         x=rounded(float(x), 1),
         y=rounded(float(y), 1),
         compass=gettext(compass(glare.directions[seat])),

@@ -102,9 +102,9 @@ def glare_plan(space: Space, year: GlareMap) -> RosePlan:
     box, body = roses(frame, wedges, ROSE * year.spacing, len(year.directions))
     (e, n), limit = year.worst()[0], LIMITS[-1]
     text = gettext(
-        "Seated eyes {height} m above the floor, {spacing} m apart, {directions} directions each, with the shading of "
+        "Eyes {height} m above the floor, {spacing} m apart, {directions} directions each, with the shading of "
         "each hour. The coloured part of a wedge's area is the share of the {hours} hours of use above each limit of "
-        "DGP; the pale wedge represents all of them. North is up. Worst view: x {x} m, y {y} m to the {compass}, "
+        "DGP; the whole wedge represents all of them. North is up. Worst view: x {x} m, y {y} m, looking {compass}, "
         "DGP above {limit} in {share} % of the hours. Computed without pictures from the illuminance at the eye, the "
         "windows' luminance and the sun's disc.",
         height=rounded(float(year.eyes[0, 2]) - space.floor_level, 1),
