@@ -51,14 +51,17 @@ def clear_room(variant) -> RoomLight:
 
 
 def test_the_map_has_the_dgp_of_pictures(clear_room):
-    """Within 0.06 in each hour and 0.025 on average: sunlit walls and the edges of patches are left out."""
+    """Towards the window with an RMS of 0.03: a sky of few patches is blurred by those of the window.
+
+    A sunlit wall before the eye is left out and makes the map lower.
+    """
     light = clear_room.light
     dgp = glare_of_eyes(light, EYES, DIRECTIONS)
     assert dgp.shape == (2, 3, len(light.sky.lit))
-    for e, n in [(0, 0), (1, 1)]:
-        pictures = hourly_glare(with_view(light, fisheye(EYES[e], DIRECTIONS[n], 120))).dgp
-        off = dgp[e, n] - pictures
-        assert np.abs(off).max() < 0.06 and np.abs(off).mean() < 0.025
+    to_window = hourly_glare(with_view(light, fisheye(EYES[1], DIRECTIONS[0], 120))).dgp
+    assert np.sqrt(np.mean((dgp[1, 0] - to_window) ** 2)) < 0.03
+    off = dgp[1, 1] - hourly_glare(with_view(light, fisheye(EYES[1], DIRECTIONS[1], 120))).dgp
+    assert off.max() < 0.02 and np.median(np.abs(off)) < 0.01
     assert (dgp[:, 2] < dgp[:, 0]).all()  # the back to the window
 
 

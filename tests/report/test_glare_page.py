@@ -21,6 +21,8 @@ from scenes.head import NO_HEAD
 from scenes.language.catalogue import in_language
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.pictures import write_check_picture
+from scenes.report.glare_figures import glare_plan
+from scenes.results import GlareMap
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.outputs import write_heat_map
 from scenes.year_of_glare.page import write_page
@@ -180,3 +182,33 @@ def test_captions_in_pictures_are_in_the_language_of_the_page(tmp_path, monkeypa
     for word in words:
         assert word in text, text
     assert language == "en" or not re.search(r"protection: high|o'clock|\d\.\d", text)
+
+
+def glare_year() -> GlareMap:
+    """Two eyes in two directions, 20 hours of use: the second eye has glare to the south in 2 of them."""
+    dgp = np.full((2, 2, 20), 0.3, dtype=np.float32)
+    dgp[1, 0, :2] = 0.5, 0.42
+    dgp[0, 1, :1] = 0.36
+    eyes = np.array([[1.5, 1.5, 1.2], [3.5, 1.5, 1.2]])
+    ways = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+    return GlareMap.of(eyes, ways, dgp, spacing=2.0, step_h=0.5)
+
+
+def test_a_glare_map_counts_hours_and_finds_the_worst_view() -> None:
+    year = glare_year()
+    assert year.worst() == [(1, 0)] and year.worst(2)[1] == (0, 0)  # equal ones in their order
+    table = year.table()
+    columns = ["eye", "direction_deg", "hours_above_0.35", "hours_above_0.40", "hours_above_0.45", "hours_of_use"]
+    assert table.loc[2, columns].tolist() == [2, 180, 1.0, 1.0, 0.5, 10.0]
+    assert table.loc[1, columns].tolist() == [1, 90, 0.5, 0.0, 0.0, 10.0]
+    assert table["dgp_exceeded_in_5_percent"].round(2).tolist() == [0.3, 0.3, 0.42, 0.3]
+
+
+def test_the_plan_of_a_glare_map_names_the_worst_view() -> None:
+    found = glare_plan(two_rooms().spaces[0], glare_year())
+    assert found.limits == ("0.35", "0.40", "0.45") and found.body.count('class="wedge"') == 4
+    assert "x 3.5 m, y 1.5 m, looking south, DGP above 0.45 in 5.0 % of the hours" in found.explanation
+    assert "x 3.5 m; y 1.5 m; south: 1 h above 0.35, 1 h above 0.40" in found.body
+    with in_language("de"):
+        german = glare_plan(two_rooms().spaces[0], glare_year())
+    assert "x 3,5 m; y 1,5 m; Süden: 1 h über 0,35" in german.body and "Blick nach Süden" in german.explanation
