@@ -397,6 +397,7 @@ class Check:
             alike=lambda one, other: (
                 self._costly(one) == self._costly(other)
                 and self._setups(one) == self._setups(other)
+                and self._glare_limits(one) == self._glare_limits(other)
                 and same_control(self.tables, self.building, one, other)
             ),
         ).results(self.progress)
