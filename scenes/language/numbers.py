@@ -7,6 +7,8 @@ Digits are rounded as Python rounds; thousands are set apart by a narrow space i
 from __future__ import annotations
 
 import math
+from datetime import date
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from scenes.language.catalogue import NARROW_SPACE, current_language, decimal, gettext
@@ -95,10 +97,14 @@ def short_month(month: int) -> str:
 
 def day_and_month(time: pd.Timestamp, *, short: bool = False) -> str:
     """A date without its year: the year of a weather file means nothing."""
+    return _date(time.date(), "MMMd" if short else "MMMMd", _locale())
+
+
+@lru_cache(maxsize=512)  # Babel takes 0.1 ms; a chart names each of its days 24 times, in every room
+def _date(day: date, skeleton: str, locale: str) -> str:
     from babel.dates import format_skeleton
 
-    skeleton = "MMMd" if short else "MMMMd"
-    return format_skeleton(skeleton, time.to_pydatetime(), locale=_locale())
+    return format_skeleton(skeleton, day, locale=locale)
 
 
 def spoken(time: pd.Timestamp) -> str:

@@ -8,10 +8,12 @@ import shutil
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import chain, pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from bim.names import folder_names
@@ -237,7 +239,7 @@ def csv_text(table: pd.DataFrame, *, index: bool = True) -> str:
     columns = [_entries(table.iloc[:, k]) for k in range(table.shape[1])]
     names = list(map(str, table.columns))
     if index:
-        columns.insert(0, ("%s", _lines(table.index.to_frame())))
+        columns.insert(0, ("%s", _rows(table.index)))
         names.insert(0, "" if table.index.name is None else str(table.index.name))
     if len(columns) == 1 and columns[0][0] == "%s":  # an empty line would be no row
         columns = [("%s", [text or '""' for text in columns[0][1]])]
@@ -257,6 +259,19 @@ def _entries(values: pd.Series) -> tuple[str, list[Any]]:
     if not values.hasnans:
         return DIGITS, values.tolist()
     return "%s", ["" if value != value else DIGITS % value for value in values.tolist()]
+
+
+def _rows(index: pd.Index) -> list[str]:
+    """The entries of a table's index."""
+    if isinstance(index.dtype, np.dtype) and index.dtype.kind == "M":
+        return _times(index.to_numpy().tobytes(), index.dtype.str)
+    return _lines(index.to_frame())
+
+
+@lru_cache(maxsize=2)  # the tables of a run have one index
+def _times(values: bytes, dtype: str) -> list[str]:
+    """Times as entries, from the bytes of an array."""
+    return _lines(pd.DataFrame({"time": np.frombuffer(values, dtype=dtype)}))
 
 
 def _lines(column: pd.DataFrame) -> list[str]:

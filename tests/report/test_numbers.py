@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from scenes.language.catalogue import ngettext
-from scenes.language.numbers import cell, percent, rounded, significant
+from scenes.language.catalogue import in_language, ngettext
+from scenes.language.numbers import cell, day_and_month, percent, rounded, significant
 from scenes.report import tables
 from scenes.report.headline import WARM_C, named_like
 from scenes.report.names import glossary, quantity
@@ -38,6 +38,21 @@ def test_digits() -> None:
     assert percent(float("nan")) == "–"
     assert cell(12345.6, 1) == "12345.6", "cells are copied into spreadsheets"
     assert cell(float("nan"), 1) == ""
+
+
+@pytest.mark.parametrize(
+    ("language", "dates"),
+    [
+        ("en", ("3 March", "29 February", "3 Mar")),
+        ("de", ("3. März", "29. Februar", "3. März")),
+        ("fr", ("3 mars", "29 février", "3 mars")),
+    ],
+)
+def test_dates_are_those_of_the_language_the_day_and_the_length(language, dates) -> None:
+    with in_language(language):
+        times = pd.to_datetime(["2021-03-03 00:30", "2020-02-29 23:30", "2021-03-03 12:30"])
+        named = tuple(day_and_month(time, short=i == 2) for i, time in enumerate(times))
+    assert named == dates
 
 
 @pytest.mark.parametrize(

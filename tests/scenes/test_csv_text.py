@@ -21,6 +21,10 @@ TABLES = {
     "objects": pd.DataFrame({"dgp": pd.Series([0.123456789, None], dtype=object)}),
     "named": pd.DataFrame({"x": [1.0]}, index=pd.Index(["A, B"], name="room")),
     "empty": pd.DataFrame({"x": pd.Series([], dtype=float)}),
+    "other hours": pd.DataFrame({"x": range(6)}, index=TIMES + pd.Timedelta(hours=6)),
+    "seconds": pd.DataFrame({"x": range(6)}, index=(TIMES + pd.Timedelta(seconds=7)).as_unit("s")),
+    "a zone": pd.DataFrame({"x": range(6)}, index=TIMES.tz_localize("Europe/Berlin")),
+    "no time": pd.DataFrame({"x": [1, 2]}, index=pd.DatetimeIndex(["2021-01-01 00:30", pd.NaT])),
     "midnights": pd.DataFrame({"x": [1.0, 2.0]}, index=pd.date_range("2021-01-01", periods=2)),
 }
 
