@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
@@ -216,10 +217,31 @@ def standard_effective_temperature(
     clothing: float = 0.5,
 ) -> NDArray[np.float64]:
     """SET [H] [degC] (Gagge two-node model, pythermalcomfort); arguments as for `pmv_ppd`."""
-    set_tmp = _model("set_tmp")
-    air, mrt, speed, moist = _surroundings(air_c, mrt_c, air_speed, humidity)
-    result = set_tmp(tdb=air, tr=mrt, v=speed, rh=moist, met=metabolic_rate, clo=clothing, **_PLAIN)
-    return np.asarray(result.set, dtype=float)
+    surroundings = _surroundings(air_c, mrt_c, air_speed, humidity)
+    return np.asarray(_set_of_hours()(*surroundings, metabolic_rate, clothing))
+
+
+@cache
+def _set_of_hours() -> Callable[..., NDArray[np.float64]]:
+    """SET of air, radiant temperature, speed, humidity [...], metabolic rate and clothing."""
+    try:
+        with _models_alone():
+            return import_module("thermal.two_nodes").set_of_hours
+    except ImportError:  # a version of the package with other names inside
+        return _set_tmp
+
+
+def _set_tmp(
+    air: NDArray[np.float64],
+    mrt: NDArray[np.float64],
+    speed: NDArray[np.float64],
+    moist: NDArray[np.float64],
+    *person: float,
+) -> NDArray[np.float64]:
+    """SET by the package's function, which calls its compiled model for each value from Python."""
+    metabolic_rate, clothing = person
+    of = {"tdb": air, "tr": mrt, "v": speed, "rh": moist, "met": metabolic_rate, "clo": clothing}
+    return np.asarray(_model("set_tmp")(**of, **_PLAIN).set, dtype=float)
 
 
 _PACKAGE = "pythermalcomfort.models"
@@ -227,7 +249,15 @@ _PACKAGE = "pythermalcomfort.models"
 
 @cache
 def _model(name: str) -> Callable[..., Any]:
-    """One model of pythermalcomfort: importing all of them compiles what is not used here, for a second."""
+    """One model of pythermalcomfort."""
+    with _models_alone():
+        model: Callable[..., Any] = getattr(import_module(f"{_PACKAGE}.{name}"), name)
+    return model
+
+
+@contextmanager
+def _models_alone() -> Iterator[None]:
+    """Import models of pythermalcomfort one by one: importing all compiles what is not used here, for a second."""
     import pythermalcomfort
 
     stand_in = _PACKAGE not in sys.modules  # for the package; a later import of it runs the package itself
@@ -235,11 +265,10 @@ def _model(name: str) -> Callable[..., Any]:
         package = sys.modules[_PACKAGE] = ModuleType(_PACKAGE)
         package.__path__ = [f"{folder}/models" for folder in pythermalcomfort.__path__]
     try:
-        model: Callable[..., Any] = getattr(import_module(f"{_PACKAGE}.{name}"), name)
+        yield
     finally:
         if stand_in:
             del sys.modules[_PACKAGE]
-    return model
 
 
 _PLAIN = {"limit_inputs": False, "round_output": False}

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 import pytest
-from pythermalcomfort.models import adaptive_ashrae, adaptive_en
+from pythermalcomfort.models import adaptive_ashrae, adaptive_en, set_tmp
 
 from thermal.comfort import (
     adaptive_comfort,
@@ -205,6 +207,30 @@ def test_set_at_its_reference_condition():
     air = np.array([25.0])
     value = standard_effective_temperature(air, air, metabolic_rate=1.0, clothing=0.6)
     assert value[0] == pytest.approx(25.0, abs=0.4)
+
+
+@pytest.mark.parametrize("person", [(1.2, 0.5), (0.8, 0.0), (3.0, 1.5)])
+def test_set_of_many_hours_is_that_of_the_package(person):
+    """Between freezing and 60 degC, dry and saturated, still and in a draught: to 1e-12 of the value (rounding)."""
+    random, hours = np.random.default_rng(4), 400
+    air, mrt = random.uniform(0.0, 60.0, hours), random.uniform(0.0, 60.0, hours)
+    speed, humidity = random.choice([0.0, 0.1, 0.15, 1.5], hours), random.uniform(0.0, 100.0, hours)
+    met, clo = person
+    about = {"air_speed": speed, "humidity": humidity, "metabolic_rate": met, "clothing": clo}
+    values = standard_effective_temperature(air, mrt, **about)
+    of_package = set_tmp(air, mrt, speed, humidity, met, clo, limit_inputs=False, round_output=False).set
+    np.testing.assert_allclose(values, of_package, rtol=1e-12)
+
+
+def test_set_by_a_package_with_other_names_inside(monkeypatch):
+    """Then the package's own function gives it, value by value."""
+    import thermal.comfort as comfort
+
+    by_loop = standard_effective_temperature([20.0, 30.0], 25.0)
+    monkeypatch.setitem(sys.modules, "thermal.two_nodes", None)
+    monkeypatch.setattr(comfort, "_set_of_hours", comfort._set_of_hours.__wrapped__)
+    assert comfort._set_of_hours() is comfort._set_tmp
+    np.testing.assert_allclose(standard_effective_temperature([20.0, 30.0], 25.0), by_loop, rtol=1e-12)
 
 
 @pytest.mark.parametrize("index", [pmv_ppd, standard_effective_temperature])
