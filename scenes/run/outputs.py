@@ -5,8 +5,10 @@ from __future__ import annotations
 import csv
 import io
 import shutil
-from collections.abc import Callable, Sequence
-from contextlib import closing
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
+from contextvars import copy_context
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import chain, pairwise
@@ -66,19 +68,19 @@ def write_results(
         several = len(result.spaces) > 1
         names = folder_names([room.space for room in result.spaces])
         places = [temporary / name if several else temporary for name in names]
-        _write_rooms(result, places, processes, progress)
-        write_table(_issues(result), temporary / "problems.csv", index=False)
-        if first_plan:
-            write_text(temporary / FIRST_PLAN, first_plan)
-        if netcdf:
-            write_netcdf(result, temporary / NETCDF)
-        if ladybug:
-            write_ladybug(result, temporary / LADYBUG)
-        if result.twin is not None:
-            result.twin.write(temporary)
-        for write, page in ((write_report, REPORT), (write_explorer, EXPLORER)):
-            if write is not None:
-                faults += _faults(write, result, temporary / page)
+        with _writing_rooms(result, places, processes, progress):
+            write_table(_issues(result), temporary / "problems.csv", index=False)
+            if first_plan:
+                write_text(temporary / FIRST_PLAN, first_plan)
+            if netcdf:
+                write_netcdf(result, temporary / NETCDF)
+            if ladybug:
+                write_ladybug(result, temporary / LADYBUG)
+            if result.twin is not None:
+                result.twin.write(temporary)
+            for write, page in ((write_report, REPORT), (write_explorer, EXPLORER)):
+                if write is not None:
+                    faults += _faults(write, result, temporary / page)
         guids = (room.space.guid for room in result.spaces)
         within = (name if several else "." for name in names)
         folders = dict(zip(guids, within, strict=True))  # of each room's tables
@@ -106,7 +108,25 @@ def _faults(write: Callable[[RunResult, Path], None], result: RunResult, page: P
     return []
 
 
-def _write_rooms(result: RunResult, places: Sequence[Path], processes: int | None, progress: Progress) -> None:
+@contextmanager
+def _writing_rooms(
+    result: RunResult, places: Sequence[Path], processes: int | None, progress: Progress
+) -> Iterator[None]:
+    """Write the files of the rooms before the block; where several processes do so, while it runs."""
+    rooms = len(result.spaces)
+    # a process takes as long to begin as it does to write some rooms
+    count = min(processes_for(rooms, processes), rooms // TASKS_A_PROCESS)
+    if count < 2:
+        _write_rooms(result, places, 1, progress)
+        yield
+        return
+    with ThreadPoolExecutor(1) as thread:
+        written = thread.submit(copy_context().run, _write_rooms, result, places, count, progress)
+        yield
+        written.result()
+
+
+def _write_rooms(result: RunResult, places: Sequence[Path], processes: int, progress: Progress) -> None:
     """The files of each room in its folder."""
     rooms = list(zip(result.spaces, places, strict=True))
     tasks = Tasks(
@@ -116,8 +136,6 @@ def _write_rooms(result: RunResult, places: Sequence[Path], processes: int | Non
         key=lambda item: item[0].space.guid,
         scene=lambda item: item[0].space.guid,
     )
-    # a process takes as long to begin as it does to write some rooms
-    processes = min(processes_for(len(rooms), processes), len(rooms) // TASKS_A_PROCESS)
     with closing(tasks.results(processes=processes)) as written:
         passed = zip(result.spaces, written, strict=True)
         for number, (_, error) in enumerate(passed, 1):  # a room passed goes out of memory
