@@ -465,13 +465,20 @@ class Check:
         glare = None
         if self.glaring and "glare" in self._costly(space):
             with times.stage(GLARE):
-                chosen = {"eye_height": self.options.eye_height, "progress": progress}
+                height = self.options.eye_height
                 if self.options.grid is None and self.options.directions == 1:
-                    glare = worst_seat_glare(room, light, state, limits=self._glare_limits(space), **chosen)
+                    limits = self._glare_limits(space)
+                    glare = worst_seat_glare(room, light, state, limits=limits, eye_height=height, progress=progress)
                 else:
-                    of_hours = None if state is None else light.states(state)
-                    seats = {"grid": self.options.grid, "directions": self.options.directions}
-                    glare = seat_glare(room, light, of_hours, **seats, **chosen)
+                    glare = seat_glare(
+                        room,
+                        light,
+                        None if state is None else light.states(state),
+                        grid=self.options.grid,
+                        directions=self.options.directions,
+                        eye_height=height,
+                        progress=progress,
+                    )
         open_all = np.zeros((skies.hours, len(room.windows.groups)), dtype=np.int64)
         state = open_all if state is None else state
         heats: dict[str, RoomHeat] = {}
