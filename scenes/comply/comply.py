@@ -34,7 +34,7 @@ from scenes.comply.assess import applies, asked_of, assess_room, values_of
 from scenes.comply.blinds import DEFAULT_NAME, open_and_closed
 from scenes.comply.dwellings import dwelling_words, judged, uses_of_rooms
 from scenes.comply.files import ComplyFiles, read_files
-from scenes.comply.findings import EyeLight, Findings, GridLight, RoomHeat, calendar_of
+from scenes.comply.findings import EyeLight, Findings, GridLight, RoomHeat, SeatGlare, calendar_of
 from scenes.comply.glare import MAP_ERROR, PICTURED, seat_glare, worst_seat_glare
 from scenes.comply.needs import DgpExceeded
 from scenes.comply.options import ComplyOptions
@@ -196,7 +196,7 @@ def room_heat(room: RoomInputs, light: RoomLight, state: NDArray[np.int64], *, p
 PARTS = TRACING, SUMS, GLARE, HEAT, EYES = (
     "V and D",
     "light and blinds of every hour",
-    "glare by pictures",
+    "glare",
     "temperatures",
     "light at the eye",
 )
@@ -409,6 +409,24 @@ class Check:
         """What of glare, heat and the eye's light a rule looks at in a room."""
         return self.asked[space.guid] & {"glare", "heat", "eye"}
 
+    def _glare(
+        self, room: RoomInputs, light: RoomLight, state: NDArray[np.int64] | None, progress: Progress
+    ) -> SeatGlare:
+        """Glare at the stated seats of a room, else at the worst views of its glare map; state: [H, G]."""
+        options = self.options
+        if options.grid is None and options.directions == 1:
+            limits = self._glare_limits(room.space)
+            return worst_seat_glare(room, light, state, limits=limits, eye_height=options.eye_height, progress=progress)
+        return seat_glare(
+            room,
+            light,
+            None if state is None else light.states(state),
+            grid=options.grid,
+            directions=options.directions,
+            eye_height=options.eye_height,
+            progress=progress,
+        )
+
     def _glare_limits(self, space: Space) -> frozenset[tuple[float, float]]:
         """Limits of DGP that the criteria of a room have, each with the share of the hours that may exceed it."""
         use = self.asked_uses[space.guid]
@@ -465,20 +483,7 @@ class Check:
         glare = None
         if self.glaring and "glare" in self._costly(space):
             with times.stage(GLARE):
-                height = self.options.eye_height
-                if self.options.grid is None and self.options.directions == 1:
-                    limits = self._glare_limits(space)
-                    glare = worst_seat_glare(room, light, state, limits=limits, eye_height=height, progress=progress)
-                else:
-                    glare = seat_glare(
-                        room,
-                        light,
-                        None if state is None else light.states(state),
-                        grid=self.options.grid,
-                        directions=self.options.directions,
-                        eye_height=height,
-                        progress=progress,
-                    )
+                glare = self._glare(room, light, state, progress)
         open_all = np.zeros((skies.hours, len(room.windows.groups)), dtype=np.int64)
         state = open_all if state is None else state
         heats: dict[str, RoomHeat] = {}
