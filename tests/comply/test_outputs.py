@@ -40,6 +40,7 @@ from scenes.demo import OFFICE, WEATHER
 from scenes.input_files import InputFiles, read_building, read_weather
 from scenes.page_options import PageOptions
 from scenes.result_folder import ResultFolder
+from scenes.results import GlareMap
 from tests.devtools import Page, chromium
 
 HEAD = """
@@ -254,6 +255,17 @@ def test_a_room_says_how_glare_was_rated(result):
     assert found == ("2 seats, 2 directions each; DGP exceeded in 5 % of the hours: 0.46 at the worst")
     one = glare_words(SeatGlare(eyes[:1], eyes[:1], dgp[:1], operated=True))
     assert one == "1 seat; DGP exceeded in 5 % of the hours: 0.30"
+
+
+def test_the_worst_view_of_a_glare_map_is_named_in_words():
+    """The second view is the worst; 3 and 4 of its and the other's hours were rated by pictures."""
+    eyes, ways = np.array([[1.0, 2.0, 1.2], [3.0, 2.0, 1.2]]), np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+    dgp = np.array([[0.3] * 20, [0.3] * 17 + [0.5] * 3])
+    plan = GlareMap.of(eyes, ways, np.full((2, 2, 20), 0.3, dtype=np.float32), spacing=2.0, step_h=1.0)
+    seats = SeatGlare(eyes, ways, dgp, True, plan, np.array([4, 3]))
+    where = "worst view of the map: x 3.0 m, y 2.0 m, looking east; DGP exceeded in 5 % of the hours: 0.50"
+    assert glare_words(seats) == f"{where}; 7 hours rated by pictures"
+    assert glare_words(replace(seats, pictured=np.array([0, 0]))) == f"{where}; decided by the map"
 
 
 def test_each_quantity_of_the_light_has_one_plan(result):
