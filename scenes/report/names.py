@@ -72,7 +72,6 @@ STAGES = {  # whose seconds are noted
     "view and sunlight": N_("view out and sunlight"),
     "V and D": N_("matrices V and D"),
     "light and blinds of every hour": N_("light and blinds of every hour"),
-    "glare by pictures": N_("glare by pictures"),
     "temperatures": N_("temperatures"),
     "what else light takes": N_("other steps of the light"),
 }
