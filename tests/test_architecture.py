@@ -37,6 +37,7 @@ SOLVERS = tuple(
         "coefficients",
         "colour_view",
         "glare",
+        "glare_map",
         "light",
         "optics",
         "phase_light",

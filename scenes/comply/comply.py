@@ -674,10 +674,10 @@ def glare_words(options: ComplyOptions, blinds: str) -> str:
     start, end = options.room.occupancy.hours
     if options.grid is None and options.directions == 1:
         return Note(
-            "Glare is rated with {blinds}, daily from {start} to {end} o'clock, at the {count} worst views of a map of "
+            "Glare is rated with {blinds}, daily from {start} to {end} o'clock, at the {views} worst views of a map of "
             "each room: eyes {spacing:g} m apart (more in rooms above {area:g} m²), {directions} directions each. "
             "Hours in which the map's error of {error:g} may decide a limit are rated by pictures of {pixels} pixels.",
-            count=PICTURED,
+            views=PICTURED,
             blinds=blinds,
             spacing=MAP_SPACING,
             area=MAP_EYES * MAP_SPACING**2,

@@ -188,7 +188,7 @@ def made(hours: int, size: int, out: Path) -> MeasuredErrors:
             found = measured(scene, traced, bsdf, lit)
             cases.append(MeasuredCase(place, name, traits_of(scene, bsdf, lit), found))
             print(name, place, {k: round(v, 3) for k, v in found.items()}, file=sys.stderr)
-            table = MeasuredErrors(f"python -m {__spec__.name}", date.today().isoformat(), tuple(cases))
+            table = MeasuredErrors("python -m tests.validation method_errors", date.today().isoformat(), tuple(cases))
             out.write_text(json.dumps(asdict(table), indent=1) + "\n")
     return MeasuredErrors.read(out)
 
