@@ -154,7 +154,7 @@ def planted_fit(folder: Path, kind: str, seed: int = 0, paths: int | None = None
     )
     table.to_csv(folder / "weather.csv", index=False)
     few = paths or (FEW_PATHS if kind == "heat" else None)
-    stated = "" if few is None else f"sensor_samples = {few}\npatch_samples = {FEW_PATHS // 8}\n"
+    stated = "" if few is None else f"sensor_samples = {few}\npatch_samples = {max(few, FEW_PATHS) // 8}\n"
     study = STUDY.replace("GLAZING", str(GLAZING)).replace("PATHS", stated).replace("SEED", str(seed))
     (folder / "room.toml").write_text(study)
     (folder / "fit.toml").write_text(HEAT if kind == "heat" else LIGHT)
