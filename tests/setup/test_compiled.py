@@ -17,11 +17,13 @@ PACKAGES = ("mitsuba_cfs", "bim", "thermal", "scenes")
 
 
 def compiling_modules() -> list[str]:
-    """The modules that hold compiled functions."""
+    """The modules that hold compiled functions, without those of pythermalcomfort, which cannot be imported there."""
     found = []
     for package in PACKAGES:
         for path in (REPOSITORY / package).rglob("*.py"):
-            if re.search(r"^@(compiled|inlined|\w*\.?njit)", path.read_text(), re.MULTILINE):
+            text = path.read_text()
+            own = "from pythermalcomfort" not in text
+            if own and re.search(r"^@(compiled|inlined|\w*\.?njit)", text, re.MULTILINE):
                 found.append(".".join(path.relative_to(REPOSITORY).with_suffix("").parts))
     return found
 
