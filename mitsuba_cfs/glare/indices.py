@@ -14,6 +14,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+# Constants of DGP as evalglare has them, see `daylight_glare_probability`
+DGP_PER_LUX, DGP_OF_CONTRAST, DGP_IN_DARK, ADAPTATION = 5.87e-5, 0.092, 0.159, 1.87
+
 
 def contrast_term(luminance: ArrayLike, omega: ArrayLike, position: ArrayLike) -> float:
     """sum L^2 omega / P^2, the term that DGP, UGR, UGP and CGI share."""
@@ -28,9 +31,9 @@ def daylight_glare_probability(illuminance: float, contrast: float, *, most: flo
     with the constants here.
     """
     if illuminance <= 0:
-        return 0.159
-    glare = 0.092 * math.log10(1 + contrast / illuminance**1.87)
-    return min(5.87e-5 * illuminance + glare + 0.159, most)
+        return DGP_IN_DARK
+    glare = DGP_OF_CONTRAST * math.log10(1 + contrast / illuminance**ADAPTATION)
+    return min(DGP_PER_LUX * illuminance + glare + DGP_IN_DARK, most)
 
 
 def simplified_dgp(illuminance: float) -> float:

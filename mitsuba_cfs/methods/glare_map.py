@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
+from mitsuba_cfs.glare.indices import ADAPTATION, DGP_IN_DARK, DGP_OF_CONTRAST, DGP_PER_LUX
 from mitsuba_cfs.glare.position_index import position_index
 from mitsuba_cfs.images.view import fisheye
 from mitsuba_cfs.methods.coefficients import direct_sensor_matrix
@@ -89,9 +90,9 @@ def probability(illuminance: Array, contrast: Array) -> Array:
 
     Source: as of `mitsuba_cfs.glare.indices.daylight_glare_probability`, of many at once.
     """
-    power = np.where(illuminance > 0, illuminance, np.inf) ** 1.87
-    dgp = 5.87e-5 * illuminance + 0.092 * np.log10(1 + contrast / power) + 0.159
-    return np.minimum(np.where(illuminance > 0, dgp, 0.159), 1.0)
+    power = np.where(illuminance > 0, illuminance, np.inf) ** ADAPTATION
+    dgp = DGP_PER_LUX * illuminance + DGP_OF_CONTRAST * np.log10(1 + contrast / power) + DGP_IN_DARK
+    return np.minimum(np.where(illuminance > 0, dgp, DGP_IN_DARK), 1.0)
 
 
 def _light_of_eyes(light: PhaseLight, eyes: Array, directions: Array, progress: Progress) -> PhaseLight:

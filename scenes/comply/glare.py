@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.glare.classes import hour_not_exceeded
-from mitsuba_cfs.images.view import fisheye
+from mitsuba_cfs.images.view import View, fisheye
 from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.light import with_view
 from mitsuba_cfs.metrics.schedules import working_hours
@@ -45,16 +45,8 @@ def seat_glare(
     rows = []
     for number, each in enumerate(views):
         steps = part(progress, number / len(views), (number + 1) / len(views), "annual glare")
-        rated = hourly_glare(
-            with_view(light.light, each.view),
-            "DGP",
-            state,
-            hours=lit,
-            options=rating_of(room.options.outputs),
-            progress=steps,
-        )
         whole = np.zeros(room.skies.hours)
-        whole[room.skies.lit[lit]] = rated.dgp
+        whole[room.skies.lit[lit]] = _by_pictures(room, light, each.view, state, lit, steps)
         rows.append(whole[used])
     return SeatGlare(
         np.array([each.view.position for each in views]),
@@ -96,17 +88,24 @@ def worst_seat_glare(
         if not len(hours):
             continue
         view = fisheye(plan.eyes[e], plan.directions[n], room.options.outputs.picture_size)
-        rated = hourly_glare(
-            with_view(light.light, view),
-            "DGP",
-            light.states(state),
-            hours=column[hours],
-            options=rating_of(room.options.outputs),
-            progress=part(progress, number / len(worst), (number + 1) / len(worst), "annual glare"),
-        )
-        dgp[number, hours] = rated.dgp
+        steps = part(progress, number / len(worst), (number + 1) / len(worst), "annual glare")
+        dgp[number, hours] = _by_pictures(room, light, view, light.states(state), column[hours], steps)
     seats, ways = np.array(worst).T
     return SeatGlare(plan.eyes[seats], plan.directions[ways], dgp, moved, plan, (known & lit).sum(axis=1))
+
+
+def _by_pictures(
+    room: RoomInputs,
+    light: RoomLight,
+    view: View,
+    state: NDArray[np.int64] | None,
+    hours: NDArray[np.int64],
+    progress: Progress,
+) -> NDArray[np.float64]:
+    """DGP of a view in some of the lit hours [n]; state: [G, L] of all of them."""
+    options = rating_of(room.options.outputs)
+    seen = with_view(light.light, view)
+    return hourly_glare(seen, "DGP", state, hours=hours, options=options, progress=progress).dgp
 
 
 def open_hours(

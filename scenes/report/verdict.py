@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mitsuba_cfs.glare.indices import DGP_IN_DARK, DGP_PER_LUX
 from mitsuba_cfs.notes import Note
 from scenes.language.catalogue import gettext, ngettext
 from scenes.language.numbers import colon, month_name, percent, rounded, semicolons, share, significant, spoken
@@ -111,8 +112,6 @@ def plus_minus(picture: LuminancePicture) -> str:
 NO_THERMAL_DATA = re.compile(r"\{system\}: no [Ug]-value given;")  # of `thermal.gvalue`
 MOST_NAMES = 4  # of systems in the first sentence, of rooms in that on shading
 LIT_LX = 300.0  # illuminance of daylight autonomy
-# DGP is BY_LIGHT times the illuminance at the eye, a term of the sources, and NO_LIGHT
-BY_LIGHT, NO_LIGHT = 5.87e-5, 0.159
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,8 +195,8 @@ def _cause(picture: LuminancePicture) -> str:
     glare = picture.glare
     if "ev" not in glare:
         return gettext("Bright surfaces are in view.")
-    by_light = BY_LIGHT * glare["ev"]
-    by_sources = glare["dgp"] - NO_LIGHT - by_light
+    by_light = DGP_PER_LUX * glare["ev"]
+    by_sources = glare["dgp"] - DGP_IN_DARK - by_light
     lux = significant(glare["ev"], 2)
     count = int(glare.get("sources", 0))
     if by_sources > by_light:
