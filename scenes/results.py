@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -74,6 +74,10 @@ class GlareMap:
         shares = np.stack([np.mean(dgp > limit, axis=2) for limit in LIMITS])
         exceeded = np.apply_along_axis(hour_not_exceeded, 2, dgp)
         return cls(eyes, directions, shares, exceeded, spacing, step_h * dgp.shape[2])
+
+    def moved(self, shift: NDArray[np.float64]) -> GlareMap:
+        """The map of an equal room elsewhere."""
+        return replace(self, eyes=self.eyes + shift)
 
     def worst(self, count: int = 1) -> list[tuple[int, int]]:
         """Eyes and directions with most glare, the worst first.

@@ -414,7 +414,7 @@ class Check:
     ) -> SeatGlare:
         """Glare at the stated seats of a room, else at the worst views of its glare map; state: [H, G]."""
         options = self.options
-        if options.grid is None and options.directions == 1:
+        if options.glare_by_map:
             limits = self._glare_limits(room.space)
             return worst_seat_glare(room, light, state, limits=limits, eye_height=options.eye_height, progress=progress)
         return seat_glare(
@@ -672,7 +672,7 @@ class Check:
 def glare_words(options: ComplyOptions, blinds: str) -> str:
     """How glare is rated; blinds: `blinds_words`."""
     start, end = options.room.occupancy.hours
-    if options.grid is None and options.directions == 1:
+    if options.glare_by_map:
         return Note(
             "Glare is rated with {blinds}, daily from {start} to {end} o'clock, at the {views} worst views of a map of "
             "each room: eyes {spacing:g} m apart (more in rooms above {area:g} m²), {directions} directions each. "
@@ -748,7 +748,6 @@ def moved_lights(lights: RoomLights, space: Space) -> RoomLights:
     grids = {name: replace(grid, points=grid.points + shift) for name, grid in lights.grids.items()}
     glare = lights.glare
     if glare is not None:
-        plan = glare.plan and replace(glare.plan, eyes=glare.plan.eyes + shift)
-        glare = replace(glare, eyes=glare.eyes + shift, plan=plan)
+        glare = replace(glare, eyes=glare.eyes + shift, plan=glare.plan and glare.plan.moved(shift))
     template = lights.space.label
     return replace(lights, space=space, grids=grids, glare=glare, template=template)

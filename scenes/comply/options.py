@@ -23,5 +23,10 @@ class ComplyOptions(InputOptions):
     day: tuple[int, int] = (3, 21)  # of the sunlight: month and day
     least_altitude_deg: float | None = None  # of the sun; None: the rule's for the country
     eye_height: float = 1.2  # above the floor [m], of the view out and of glare
-    grid: float | None = None  # [m] spacing of the eyes that glare is rated at; None: one a room
+    grid: float | None = None  # [m] spacing of the eyes that glare is rated at; None: one, or `glare_by_map`
     directions: int = 1  # in which each of them looks
+
+    @property
+    def glare_by_map(self) -> bool:
+        """Whether glare is rated at the worst views of a map, as no seats are stated."""
+        return self.grid is None and self.directions == 1

@@ -108,7 +108,7 @@ def moved_result(result: Moved, space: Space) -> Moved:
     explored = result.explored
     if explored is not None:
         explored = replace(explored, windows=tuple(one + shift for one in explored.windows))
-    plan = result.glare_map and replace(result.glare_map, eyes=result.glare_map.eyes + shift)
+    plan = result.glare_map and result.glare_map.moved(shift)
     return replace(
         result,
         space=space,
