@@ -10,6 +10,7 @@ import signal
 import sys
 import threading
 import time
+import traceback
 from collections.abc import Sequence
 from importlib import import_module, metadata
 from types import FrameType
@@ -271,8 +272,10 @@ def run(arguments: Sequence[str]) -> int:
         return _ended(ended.number)
     except Exception as error:
         line = _user_line(error)
-        if line is None or os.environ.get("CFS_DEBUG") == "1":
+        if line is None:
             raise
+        if os.environ.get("CFS_DEBUG") == "1":
+            traceback.print_exception(error)
         click.echo(line, err=True)
         return USAGE if isinstance(error, click.UsageError) else FAILED
 

@@ -46,6 +46,9 @@ class LuminancePicture:
     source_mask: NDArray[np.bool_] | None = None  # [ny, nx]
 
 
+MAP_ERROR = 0.03  # of the DGP of a glare map, see docs/evidence_glare.md
+
+
 @dataclass(frozen=True, slots=True)
 class GlareMap:
     """DGP of seated eyes over a room in several directions, with the shading of each hour.

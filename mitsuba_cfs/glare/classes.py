@@ -52,8 +52,12 @@ def protection_level(dgp: ArrayLike) -> str:
     Returns:
         "high" (0.35), "medium" (0.40), "minimum" (0.45) or "none".
     """
-    worst = hour_not_exceeded(dgp)
-    return LEVELS[int(np.searchsorted(LIMITS, worst, side="left"))]
+    return level_of(hour_not_exceeded(dgp))
+
+
+def level_of(not_exceeded: float) -> str:
+    """Level of `protection_level` by the DGP that is exceeded in at most 5 % of the hours of use."""
+    return LEVELS[int(np.searchsorted(LIMITS, not_exceeded, side="left"))]
 
 
 def class_hours(dgp: ArrayLike) -> NDArray[np.int64]:

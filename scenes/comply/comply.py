@@ -35,7 +35,7 @@ from scenes.comply.blinds import DEFAULT_NAME, open_and_closed
 from scenes.comply.dwellings import dwelling_words, judged, uses_of_rooms
 from scenes.comply.files import ComplyFiles, read_files
 from scenes.comply.findings import EyeLight, Findings, GridLight, RoomHeat, SeatGlare, calendar_of
-from scenes.comply.glare import MAP_ERROR, PICTURED, seat_glare, worst_seat_glare
+from scenes.comply.glare import PICTURED, seat_glare, worst_seat_glare
 from scenes.comply.needs import DgpExceeded
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outdoors import OutdoorMesh, outdoors_of
@@ -54,6 +54,7 @@ from scenes.input_files import building_of
 from scenes.inputs import first_states, inputs_of
 from scenes.language.catalogue import N_
 from scenes.report.method import METHODS
+from scenes.results import MAP_ERROR
 from scenes.room.control_groups import same_control
 from scenes.room.daylight import overcast_factor
 from scenes.room.glare import MAP_DIRECTIONS, MAP_EYES, MAP_SPACING

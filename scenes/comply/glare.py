@@ -11,15 +11,14 @@ from mitsuba_cfs.glare.classes import hour_not_exceeded
 from mitsuba_cfs.images.view import View, fisheye
 from mitsuba_cfs.methods.glare import hourly_glare
 from mitsuba_cfs.methods.light import with_view
-from mitsuba_cfs.metrics.schedules import working_hours
 from mitsuba_cfs.progress import Progress, part, silent
 from scenes.comply.findings import SeatGlare
+from scenes.results import MAP_ERROR
 from scenes.room.glare import glare_map, rating_of
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
 from scenes.room_views import eyes_of
 
-MAP_ERROR = 0.03  # of the DGP of a glare map, see docs/evidence_glare.md
 PICTURED = 2  # seats of a map whose hours are rated by pictures, at most
 
 
@@ -39,7 +38,7 @@ def seat_glare(
         state: [G, L] of the window groups in each lit hour; None: the first all year.
         grid, directions, eye_height: of the eyes, see `scenes.room_views.eyes_of`.
     """
-    used = working_hours(room.weather, *room.options.occupancy.hours)
+    used = room.occupied
     lit = np.flatnonzero(used[room.skies.lit])
     views = eyes_of(room.space, grid, directions, eye_height, room.options.outputs.picture_size)
     rows = []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from mitsuba_cfs.notes import Note
 from scenes.fenestration.systems import FenestrationSystem, States, with_see_through
 
 DIM = 10.0  # [lx] at the eye, below which relative changes do not matter
+SAME_DGP, SAME_LIGHT = 0.001, 0.1  # differences of DGP and of light [%] that are not told apart
 LEAST_PEAK = 0.01  # transmittance at normal incidence below which a peak is not noted
 
 
@@ -64,18 +65,32 @@ def lobe_notes(effects: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
         notes.append(_lobe_note(max(rated, key=_dgp_change)))
     lit = [one for one in effects if "sensor_change_most" in one]
     if lit:
-        notes.append(
-            Note(
-                "As a lobe, an undecided transmission peak changes the illuminance of a sensor by "
-                "{least:+.1f} to {most:+.1f} % (mean of {count} hours with sun).",
-                "As a lobe, an undecided transmission peak changes the illuminance of a sensor by "
-                "{least:+.1f} to {most:+.1f} % (in an hour with sun).",
-                count=int(lit[0]["sensor_hours_both_ways"]),
-                least=min(one["sensor_change_least"] for one in lit),
-                most=max(one["sensor_change_most"] for one in lit),
-            )
-        )
+        notes.append(_sensor_note(lit))
     return tuple(notes)
+
+
+def _sensor_note(effects: Sequence[Mapping[str, Any]]) -> str:
+    count = int(effects[0]["sensor_hours_both_ways"])
+    least = min(effect["sensor_change_least"] for effect in effects)
+    most = max(effect["sensor_change_most"] for effect in effects)
+    if max(abs(least), abs(most)) < SAME_LIGHT:
+        return Note(
+            "As a lobe, an undecided transmission peak changes the illuminance of a sensor by "
+            "less than {light} % (mean of {count} hours with sun).",
+            "As a lobe, an undecided transmission peak changes the illuminance of a sensor by "
+            "less than {light} % (in an hour with sun).",
+            count=count,
+            light=SAME_LIGHT,
+        )
+    return Note(
+        "As a lobe, an undecided transmission peak changes the illuminance of a sensor by "
+        "{least:+.1f} to {most:+.1f} % (mean of {count} hours with sun).",
+        "As a lobe, an undecided transmission peak changes the illuminance of a sensor by "
+        "{least:+.1f} to {most:+.1f} % (in an hour with sun).",
+        count=count,
+        least=least,
+        most=most,
+    )
 
 
 def _dgp_change(effect: Mapping[str, Any]) -> float:
@@ -83,6 +98,17 @@ def _dgp_change(effect: Mapping[str, Any]) -> float:
 
 
 def _lobe_note(effect: Mapping[str, Any]) -> str:
+    least, most = effect["eye_change_least"], effect["eye_change_most"]
+    if _dgp_change(effect) < SAME_DGP and max(abs(least), abs(most)) < SAME_LIGHT:
+        return Note(
+            "The data do not show whether the transmission peak is specular. Computed both ways in {count} hours: "
+            "DGP differs by less than {dgp}, the illuminance at the eye by less than {light} %.",
+            "The data do not show whether the transmission peak is specular. Computed both ways: "
+            "DGP differs by less than {dgp}, the illuminance at the eye by less than {light} %.",
+            count=int(effect["hours_both_ways"]),
+            dgp=SAME_DGP,
+            light=SAME_LIGHT,
+        )
     return Note(
         "The data do not show whether the transmission peak is specular. Computed both ways in "
         "{count} hours: as a lobe, DGP is {lobe:.3f} instead of {beam:.3f} where it differs most, "
@@ -93,8 +119,8 @@ def _lobe_note(effect: Mapping[str, Any]) -> str:
         count=int(effect["hours_both_ways"]),
         lobe=effect["dgp_as_lobe"],
         beam=effect["dgp_as_beam"],
-        least=effect["eye_change_least"],
-        most=effect["eye_change_most"],
+        least=least,
+        most=most,
     )
 
 

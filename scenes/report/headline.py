@@ -9,16 +9,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pandas as pd
 
-from mitsuba_cfs.glare.classes import hour_not_exceeded, mean_error, protection_level
+from mitsuba_cfs.glare.classes import hour_not_exceeded, level_of, mean_error
 from scenes.language.catalogue import N_, decimal, gettext, ngettext
 from scenes.language.numbers import percent, rounded, semicolons, significant, spoken
 from scenes.provision_levels import provision_levels
 from scenes.report.names import quantity
 from scenes.report.tables import GLARE_WORDS, glare_class, step_hours
-from scenes.results import RoomYear, RunResult
+from scenes.results import MAP_ERROR, RoomYear, RunResult
 
 WARM_C = 26.0  # operative temperature above which hours are counted
-PROTECTION = {  # DGP of EN 17037's levels
+PROTECTION = {  # DGP of EN 17037's levels, the best first
     "high": N_("high: at most 0.35"),
     "medium": N_("medium: at most 0.40"),
     "minimum": N_("minimum: at most 0.45"),
@@ -240,12 +240,24 @@ def _protection(room: RoomYear) -> Card | None:
     if room.annual_glare is None or not occupied(room).any():
         return None
     dgp = room.annual_glare["dgp"].fillna(0.0).to_numpy()[occupied(room).to_numpy()]
-    words = gettext(
-        "protection from glare (EN 17037): DGP exceeds {dgp} in at most 5 % of the occupied hours",
-        dgp=rounded(hour_not_exceeded(dgp), 2),
-    )
+    seen = hour_not_exceeded(dgp)
     noise = mean_error(room.annual_glare.get("dgp_standard_error", ()))
-    return protection_card(protection_level(dgp), noise, words, -hour_not_exceeded(dgp))
+    if room.glare_map is None:
+        words = gettext(
+            "protection from glare (EN 17037): DGP exceeds {dgp} in at most 5 % of the occupied hours",
+            dgp=rounded(seen, 2),
+        )
+        return protection_card(level_of(seen), noise, words, -seen)
+    seats = float(room.glare_map.not_exceeded.max())
+    level = max(level_of(seen), level_of(seats - MAP_ERROR), key=list(PROTECTION).index)
+    words = gettext(
+        "protection from glare (EN 17037): DGP exceeded in at most 5 % of the occupied hours: {seen} at the view "
+        "point, {seats} ± {error} at the worst seat of the glare map",
+        seen=rounded(seen, 2),
+        seats=rounded(seats, 2),
+        error=decimal(f"{MAP_ERROR:g}"),
+    )
+    return protection_card(level, noise, words, -max(seen, seats - MAP_ERROR))
 
 
 def protection_card(level: str, noise: float | None, words: str = "", worth: float | None = None) -> Card:
@@ -253,7 +265,7 @@ def protection_card(level: str, noise: float | None, words: str = "", worth: flo
 
     Args: noise: standard error of an hour's DGP from the tracing; None where it is not known.
     """
-    order = ("none", "minimum", "medium", "high").index(level)
+    order = len(PROTECTION) - 1 - list(PROTECTION).index(level)
     return Card(
         gettext("Protection from glare"),
         gettext(LEVEL_WORDS[level]).capitalize(),

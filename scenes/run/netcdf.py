@@ -1,8 +1,9 @@
 """The results of a run as one xarray data set and netCDF file, with units by the CF conventions.
 
 Dimensions: `time`, the middle of each interval; `sensor`, those of all rooms one after the other;
-`surface`, walls and windows of all rooms; `picture`; `room`.  Names are those of the CSV files;
-what sums a year up begins with `sensor_` or `room_`.
+`surface`, walls and windows of all rooms; `picture`; `view`, the eyes of all glare maps in each
+direction; `room`.  Names are those of the CSV files; what sums a year up begins with `sensor_`,
+`view_` or `room_`.
 
 Source: CF Metadata Conventions 1.11; units as UDUNITS knows them.
 """
@@ -42,6 +43,11 @@ STANDARD = {  # names of the CF standard name table
     "relative_humidity_percent": "relative_humidity",
 }
 PLACES = {axis: {"units": "m", "long_name": f"{axis} of the sensor"} for axis in "xyz"}
+VIEWS = {axis: {"units": "m", "long_name": f"{axis} of the eye"} for axis in "xyz"} | {
+    "direction_deg": {"units": "degree", "long_name": "azimuth of the line of sight, from north by east"},
+    "hours_of_use": {"units": "h", "long_name": "hours of use"},
+    "dgp_exceeded_in_5_percent": {"units": "1", "long_name": "DGP exceeded in 5 % of the hours of use"},
+}
 
 
 def year_dataset(result: RunResult) -> Dataset:
@@ -55,7 +61,7 @@ def year_dataset(result: RunResult) -> Dataset:
     rooms = result.spaces
     names = folder_names([room.space for room in rooms])
     variables = _hours(rooms) | _sensors(rooms, names) | _surfaces(rooms, names)
-    variables |= _pictures(result, names) | _years(rooms)
+    variables |= _pictures(result, names) | glare_map_variables(rooms, names) | _years(rooms)
     coordinates = {
         "time": ("time", result.times, {"long_name": "middle of the hour, local standard time"}),
         "room": ("room", names, {"long_name": "folder of the room"}),
@@ -70,8 +76,9 @@ def year_dataset(result: RunResult) -> Dataset:
         "source": f"mitsuba-cfs {version}, {result.method}, {manifest['system']}",
         "site": str(manifest["site"]),
     }
-    owners = ("sensor_room", "surface_name", "surface_room", "picture_time", "picture_room")
-    places = [name for name in (*PLACES, *owners) if name in variables]
+    owners = ("sensor_room", "surface_name", "surface_room", "picture_time", "picture_room", "view_room")
+    views = [f"view_{name}" for name in (*PLACES, "direction_deg")]
+    places = [name for name in (*PLACES, *owners, *views) if name in variables]
     return xr.Dataset(variables, coordinates, about).set_coords(places)
 
 
@@ -195,6 +202,25 @@ def _pictures(result: RunResult, names: Iterable[str]) -> Variables:
     for name in whole:
         values = whole[name].to_numpy(dtype=float)
         variables[f"picture_{name}"] = (("picture",), values, attributes(name))
+    return variables
+
+
+def glare_map_variables(rooms: Iterable[RoomYear], names: Iterable[str]) -> Variables:
+    """Glare of a year at each eye and in each direction of the rooms' glare maps."""
+    tables = [
+        room.glare_map.table().drop(columns="eye").assign(room=name)
+        for room, name in zip(rooms, names, strict=True)
+        if room.glare_map is not None
+    ]
+    if not tables:
+        return {}
+    whole = pd.concat(tables, ignore_index=True)
+    variables: Variables = {
+        "view_room": (("view",), whole.pop("room").to_numpy(str), {"long_name": "room of the view"})
+    }
+    for name in whole:
+        about = VIEWS.get(name) or {"units": "h", "long_name": f"hours of use with DGP above {name[-4:]}"}
+        variables[f"view_{name}"] = (("view",), whole[name].to_numpy(dtype=float), about)
     return variables
 
 

@@ -28,7 +28,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.glare.indices import contrast_term, daylight_glare_probability
 from mitsuba_cfs.glare.sun_disc import spread_sun_dgp
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
-from scenes.fenestration.peaks import peak_note
+from scenes.fenestration.peaks import lobe_effect, lobe_effect_on_sensors, lobe_notes, peak_note
 from scenes.fenestration.resolver import fill_windows
 from scenes.fenestration.systems import FenestrationSystem, WindowOverrides, read_system, system_of, with_see_through
 from scenes.head import system_notes
@@ -197,3 +197,15 @@ def test_the_user_says_what_the_peak_of_a_bsdf_between_panes_is(tmp_path):
     assert filled(("shade.xml", 0.4), ("glazing", 0.5)).visible.see_through == 0.5  # of the whole
     with pytest.raises(DataError, match=r"no system is .other\.xml.; there are shade\.xml"):
         filled(("other.xml", 1.0))
+
+
+def test_effects_that_cannot_be_told_apart_are_not_stated_as_two_equal_figures() -> None:
+    dgp, light = np.array([0.995, 0.31]), np.array([900.0, 400.0])
+    same = lobe_effect((dgp, light), (dgp + 4e-4, light * 1.0004)) | lobe_effect_on_sensors(light[None], light[None])
+    glare, sensors = lobe_notes([same])
+    assert "DGP differs by less than 0.001, the illuminance at the eye by less than 0.1 %" in glare
+    assert "by less than 0.1 %" in sensors
+    glare, sensors = lobe_notes([same, lobe_effect((dgp, light), (dgp - 0.01, light * 0.9))])
+    assert "DGP is 0.985 instead of 0.995" in glare and "-10.0 to -10.0 %" in glare
+    (sensors,) = lobe_notes([lobe_effect_on_sensors(light[None], light[None] * 1.02)])
+    assert "+2.0 to +2.0 %" in sensors

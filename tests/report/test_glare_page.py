@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from contextlib import nullcontext
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -22,12 +23,13 @@ from scenes.language.catalogue import in_language
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.pictures import write_check_picture
 from scenes.report.glare_figures import glare_plan
+from scenes.report.headline import GLARE_OF_YEAR, POOR, cards
 from scenes.results import GlareMap
 from scenes.year_of_glare.options import YearOptions
 from scenes.year_of_glare.outputs import write_heat_map
 from scenes.year_of_glare.page import write_page
 from tests.devtools import Page, chromium
-from tests.report.synthetic import two_rooms
+from tests.report.synthetic import run_result, two_rooms
 
 DIRECTIONS = 4
 SIDES = [((1, 0), 0, 1), ((0, 1), 1, -1), ((0, -1), 1, 1)]
@@ -202,6 +204,26 @@ def test_a_glare_map_counts_hours_and_finds_the_worst_view() -> None:
     assert table.loc[2, columns].tolist() == [2, 180, 1.0, 1.0, 0.5, 10.0]
     assert table.loc[1, columns].tolist() == [1, 90, 0.5, 0.0, 0.0, 10.0]
     assert table["dgp_exceeded_in_5_percent"].round(2).tolist() == [0.3, 0.3, 0.42, 0.3]
+
+
+@pytest.mark.parametrize(
+    ("seats", "value", "words"),
+    [
+        (0.30, "High", "0.31 at the view point, 0.30 ± 0.03 at the worst seat"),
+        (0.37, "High", "0.31 at the view point, 0.37 ± 0.03 at the worst seat"),  # within the map's error of 0.35
+        (0.44, "Minimum", "0.31 at the view point, 0.44 ± 0.03 at the worst seat"),
+        (0.60, "None", "0.31 at the view point, 0.60 ± 0.03 at the worst seat"),
+    ],
+)
+def test_the_protection_from_glare_is_that_of_the_worst_seat_where_the_map_tells(seats, value, words) -> None:
+    result = run_result(picture_size=32, pictures=1)
+    room = result.spaces[1]
+    year = room.annual_glare.assign(dgp=0.31)
+    eyes, ways = np.array([[1.5, 1.5, 1.2]]), np.array([[0.0, -1.0, 0.0]])
+    plan = GlareMap.of(eyes, ways, np.full((1, 1, 20), seats, dtype=np.float32), spacing=2.0, step_h=1.0)
+    (card,) = (c for c in cards(result, replace(room, annual_glare=year, glare_map=plan)) if c.code == GLARE_OF_YEAR)
+    assert card.value == value and words in card.words
+    assert (card.grade == POOR) == (value == "None")
 
 
 def test_the_plan_of_a_glare_map_names_the_worst_view() -> None:

@@ -102,10 +102,12 @@ def test_a_fault_of_the_program_keeps_its_traceback(failing) -> None:
         failing(lambda: 1 / 0)
 
 
-def test_debugging_shows_the_traceback_of_a_users_mistake(failing, monkeypatch) -> None:
+def test_debugging_adds_the_traceback_of_a_users_mistake(failing, monkeypatch, capsys) -> None:
     monkeypatch.setenv("CFS_DEBUG", "1")
-    with pytest.raises(DataError):
-        failing(_raise(DataError("bad")))
+    assert failing(_raise(DataError("bad"))) == 1
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0].startswith("Traceback") and lines[-1] == "error: bad"
+    assert failing(_raise(click.UsageError("bad"))) == 2
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import re
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,8 @@ import pytest
 
 from scenes.cli import run
 from scenes.quick import NOTE
+from scenes.results import GlareMap
+from scenes.run.netcdf import glare_map_variables
 from tests.conftest import REPOSITORY
 
 pytestmark = pytest.mark.early
@@ -133,6 +136,26 @@ def test_netcdf_holds_the_numbers_of_the_tables_with_their_units(results):
         assert all(values.attrs["units"] and values.attrs["long_name"] for values in numbers)
         assert data.attrs["Conventions"].startswith("CF-")
         assert list(data["room_label"].to_numpy()) == ["A South office"]
+
+
+def test_netcdf_has_the_glare_maps_of_all_rooms():
+    """The rows of the rooms' tables, one after the other; a room without a map has none."""
+    eyes, ways = np.array([[1.0, 2.0, 1.2], [3.0, 2.0, 1.2]]), np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+    dgp = np.random.default_rng(1).uniform(0.3, 0.5, (2, 2, 40)).astype(np.float32)
+    maps = [
+        GlareMap.of(eyes, ways, dgp, spacing=2.0, step_h=0.5),
+        None,
+        GlareMap.of(eyes[:1], ways, dgp[:1], spacing=2.0, step_h=0.5),
+    ]
+    variables = glare_map_variables([SimpleNamespace(glare_map=plan) for plan in maps], ["A", "B", "C"])
+    tables = pd.concat([plan.table() for plan in maps if plan is not None])
+    assert list(variables["view_room"][1]) == ["A"] * 4 + ["C"] * 2
+    for name in tables.columns.drop("eye"):
+        dimensions, values, about = variables[f"view_{name}"]
+        assert dimensions == ("view",) and about["units"] and about["long_name"]
+        assert np.array_equal(values, tables[name])
+    assert variables["view_direction_deg"][2]["units"] == "degree"
+    assert variables["view_hours_above_0.40"][2]["long_name"] == "hours of use with DGP above 0.40"
 
 
 def test_the_folder_of_ladybug_tools_has_the_illuminances_of_the_run(results):
