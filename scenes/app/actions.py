@@ -231,12 +231,11 @@ def _filled(project: Project, study: Mapping[str, Any], system: Mapping[str, Any
 
 
 def _states(project: Project, system: Mapping[str, Any]) -> list[str]:
-    """The options of `cfs comply` for a system: a moving one has an open and a closed state."""
+    """The options of `cfs comply` for a system: a moving one is moved by its own control."""
     operation = system.get("operation")
     if "bsdf" in system or not operation:
         return _bsdf(system)
-    paths = project.states(operation)
-    return ["--cfs", paths[0], "--closed", paths[-1]] if paths else []
+    return ["--operation", operation] if project.states(operation) else []
 
 
 def _bsdf(system: Mapping[str, Any]) -> list[str]:

@@ -382,6 +382,8 @@ class ClosureTable(TomlTable):
 
     def placed(self: Table, folder: Path) -> Table:
         """The table with the files of its panes in a folder."""
+        if not self.layers:  # so that the table does not state any
+            return self
         layers = tuple(
             layer if layer.pane is None else layer.model_copy(update={"pane": folder / layer.pane})
             for layer in self.layers

@@ -11,12 +11,14 @@ import pandas as pd
 import pytest
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import write_text
 from scenes.cli import run as main
-from scenes.fenestration.systems import system_of_panes
+from scenes.fenestration.library import write_library_system
+from scenes.fenestration.systems import read_system, system_of_panes
 from scenes.fenestration.thermal_file import GlazingLayerTable
 from scenes.fenestration.thermal_system import thermal_system
 from scenes.heat.study_file import StudyFile, read_study
-from scenes.room.operation import read_state
+from scenes.room.operation import read_operation, read_state
 from tests.validation import ashrae140_studies, energyplus_study
 from tests.validation.ashrae140 import RANGES
 from tests.validation.ashrae140_sun import ANGLES, glass
@@ -60,6 +62,23 @@ def test_layers_of_a_study_go_before_u_and_g_of_the_file_beside() -> None:
     heat = thermal_system(read_state(table, table.bsdf))
     assert heat.fenestration.u_value == pytest.approx(0.985, abs=0.002)  # beside: 0.884
     assert heat.g_value[0] == pytest.approx(0.201, abs=0.001)  # beside: 0.2093
+
+
+def test_a_state_has_the_layers_beside_its_bsdf_unless_its_table_states_its_own(tmp_path) -> None:
+    """In an operation file as in a study; the same U as that of `--cfs`."""
+    write_library_system("double low-e", "", tmp_path / "glass.xml")
+    text = '[[system]]\nbsdf = "glass.xml"\n'
+    write_text(tmp_path / "moved.toml", text + '[[system]]\nbsdf = "glass.xml"\nu_model = "typical"\n')
+    beside, typical = read_operation(tmp_path / "moved.toml").systems
+    expected = thermal_system(read_system(tmp_path / "glass.xml"))
+    assert thermal_system(beside).fenestration.u_value == expected.fenestration.u_value
+    assert not any("layers assumed" in note for note in thermal_system(beside).notes)
+    assert typical.closure.unit is None
+    write_text(tmp_path / "x.epw", "")
+    box = "[box]\nwidth = 4\ndepth = 5\nheight = 3\n[[box.window]]\nx = 1\nsill = 1\nwidth = 2\nheight = 1\n"
+    write_text(tmp_path / "room.toml", f'weather = "x.epw"\n{box}{text}')
+    (table,) = read_study(tmp_path / "room.toml").system
+    assert read_state(table, table.bsdf).closure.unit is not None
 
 
 @pytest.mark.parametrize(
