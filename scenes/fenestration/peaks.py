@@ -14,7 +14,7 @@ from mitsuba_cfs.notes import Note
 from scenes.fenestration.systems import FenestrationSystem, States, with_see_through
 
 DIM = 10.0  # [lx] at the eye, below which relative changes do not matter
-SAME_DGP, SAME_LIGHT = 0.001, 0.1  # differences of DGP and of light [%] that are not told apart
+SAME_DGP, SAME_LIGHT = 0.001, 0.1  # least differences of DGP and of light [%] that are stated
 LEAST_PEAK = 0.01  # transmittance at normal incidence below which a peak is not noted
 
 
