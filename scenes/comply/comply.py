@@ -532,11 +532,9 @@ class Check:
         return asked.states[:, room.windows.control]
 
     def _rule_words(self) -> Iterator[str]:
-        """Included and omitted parts of each rule of heat; rules that ask for other weather."""
+        """Included and omitted parts of each rule; rules that ask for other weather."""
         weather = self.files.weather
         for rule in self.files.rules.values():
-            if not rule.parts & {"heat", "eye"}:  # theirs are listed by --list and in docs/comply.md
-                continue
             if not rule.fits(weather):
                 yield Note(
                     "{rule}: no verdict. It asks for the weather of {sites}; {file} is not that.",

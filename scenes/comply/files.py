@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -52,11 +53,23 @@ def read_files(options: ComplyOptions) -> ComplyFiles:
         raise DataError("expected at least one rule", field="--standard")
     inputs = read_inputs(options, light_only=True)
     rules = {name: rule.of_weather(inputs.weather) for name, rule in rules.items()}
+    _check_weather(rules, inputs.weather)
     altitude, source = least_altitude(options, rules, inputs.weather)
     closed = None if options.closed is None else read_system(options.closed, by="--closed")
     uses = read_uses(options.uses)
     lamps = None if options.lamps is None else read_operation(options.lamps)
     return ComplyFiles(inputs, rules, uses, closed, lamps, altitude, source)
+
+
+def _check_weather(rules: Mapping[str, RuleTable], weather: Weather) -> None:
+    """Raise `DataError` where each rule asks for other weather, so that there would be no verdict at all."""
+    if any(rule.fits(weather) for rule in rules.values()):
+        return
+    name, rule = next(iter(rules.items()))
+    message = (
+        f"{name} asks for the weather of {rule.weather_asked}; this is of {weather.site}: there would be no verdict"
+    )
+    raise DataError(message, file=weather.file, field="--weather")
 
 
 def least_altitude(options: ComplyOptions, rules: dict[str, RuleTable], weather: Weather) -> tuple[float, str]:
