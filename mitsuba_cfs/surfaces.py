@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.gloss import Gloss
 
+PLANE = 0.98  # least area of a window's projection on its plane, of its own
 MOST_GROUPS = 4  # of surfaces by whose reflectances matrices are derived
 
 
@@ -36,6 +37,8 @@ class Surfaces:
         n = len(self.triangles)
         if self.triangles.shape != (n, 3, 3):
             raise ValueError(f"triangles: expected [N, 3, 3], got {self.triangles.shape}")
+        if not np.isfinite(self.triangles).all():
+            raise ValueError("triangles: expected finite numbers")
         if self.reflectance.shape != (n,) or self.surface.shape != (n,):
             raise ValueError(f"reflectance and surface: expected one entry for each of {n} triangles")
         if n and not (np.min(self.reflectance) >= 0 and np.max(self.reflectance) <= 1):
@@ -106,10 +109,15 @@ class WindowSurface:
         t = np.asarray(self.triangles, dtype=float)
         if t.ndim != 3 or t.shape[1:] != (3, 3) or len(t) == 0:
             raise ValueError(f"window {self.name}: expected triangles [T, 3, 3], got {t.shape}")
-        area_vector = area_vectors(t).sum(axis=0)
+        if not np.isfinite(t).all():
+            raise ValueError(f"window {self.name}: triangles: expected finite numbers")
+        vectors = area_vectors(t)
+        area_vector = vectors.sum(axis=0)
         length = np.linalg.norm(area_vector)
         if not length > 0:
             raise ValueError(f"window {self.name}: has no area")
+        if length < PLANE * np.linalg.norm(vectors, axis=1).sum():
+            raise ValueError(f"window {self.name}: its triangles are not in one plane, or face both sides")
         object.__setattr__(self, "triangles", t)
         object.__setattr__(self, "normal", area_vector / length)
 

@@ -155,3 +155,51 @@ def test_an_argument_of_another_type_is_refused_by_its_name(call, words):
 def test_lists_are_surfaces_too():
     triangle = [[[0, 0, 0], [1, 0, 0], [0, 1, 0]]]
     assert cfs.Surfaces(triangle, [0.5], [0]).areas == pytest.approx([0.5])
+
+
+CORNERS = np.array([[1.0, 0, 1], [3, 0, 1], [3, 0, 2.5], [1, 0, 2.5]])
+
+
+def _quad(corners: Any) -> np.ndarray:
+    a, b, c, d = np.asarray(corners, dtype=float)
+    return np.array([[a, b, c], [a, c, d]])
+
+
+def _room(window: Any) -> cfs.DaylightScene:
+    floor = cfs.Surfaces(_quad([[0, 0, 0], [4, 0, 0], [4, 6, 0], [0, 6, 0]]), [0.2, 0.2], [0, 0])
+    group = cfs.WindowGroup("south", (cfs.WindowSurface("south", _quad(window)),))
+    return cfs.DaylightScene(floor, cfs.Surfaces.none(), [group])
+
+
+def test_a_window_that_faces_its_room_or_is_not_plane_is_refused():
+    """Both gave an answer without a word: no light at all, and that of another window."""
+    assert np.allclose(_room(CORNERS).groups[0].frame[2], [0, -1, 0])
+    with pytest.raises(ValueError, match="window south: its normal points into the room"):
+        _room(CORNERS[::-1])
+    bent = CORNERS.copy()
+    bent[2, 1] = -1.0
+    for corners, words in ((bent, "not in one plane"), (CORNERS * [math.nan, 1, 1], "finite")):
+        with pytest.raises(ValueError, match=words):
+            cfs.WindowSurface("south", _quad(corners))
+
+
+def test_numbers_that_are_none_are_refused_in_arrays():
+    with pytest.raises(ValueError, match="triangles: expected finite"):
+        cfs.Surfaces(np.full((1, 3, 3), math.nan), [0.5], [0])
+    with pytest.raises(ValueError, match="straight: expected shares"):
+        cfs.AngularOptics([0.0, math.nan, 0.7])
+    for tau, rho, words in (
+        (math.nan, 0.1, "transmittance: expected numbers from 0 to 1"),
+        (0.5, math.inf, "reflectance: expected numbers from 0 to 1"),
+        (0.8, 0.5, "transmits and reflects more than it receives"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            thermal.thermal_data(tau, rho, u_value=1.1, g_normal=0.85)
+
+
+def test_a_sky_of_another_subdivision_is_refused():
+    matrices = cfs.phase_matrices(_room(CORNERS), cfs.Sampling(patch_samples=16, subdivision=2), needs=())
+    sky = cfs.given_sky([[0, -0.6, 0.8]], [500], [100], 1, day_of_year=1)
+    with pytest.raises(ValueError, match="sky: has 146 patches, the matrices 578"):
+        cfs.phase_light(matrices, [[cfs.AngularOptics([0.0, 0.7, 0.7])]], sky)
+    assert len(repr(matrices.daylight)) < 120 and "relative_error=" in repr(matrices.daylight)

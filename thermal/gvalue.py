@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermal.errors import require, require_range
 from thermal.notes import ThermalNote
 
+GAIN = 0.02  # of light, that measured data may have
 # EN 13363-1:2003 as in Kuhn 2006 and the dissertation [W/(m2 K)]: external, internal, integrated
 EXTERNAL_CONDUCTANCES = (6.0, 18.0)
 INTERNAL_CONDUCTANCE = 18.0
@@ -74,6 +75,11 @@ def thermal_data(
     fits = shading_position in TYPICAL_SYSTEMS
     require(fits, "shading position", f"{shading_position!r} is not of {known}")
     tau, rho = np.asarray(transmittance, dtype=float), np.asarray(reflectance, dtype=float)
+    for values, what in ((tau, "transmittance"), (rho, "reflectance")):
+        within = bool(np.all((values >= 0) & (values <= 1)))  # NaN fails
+        require(within, f"{item}: {what}", f"expected numbers from 0 to 1, got {values}")
+    fits = bool(np.all(tau + rho <= 1 + GAIN))
+    require(fits, item, "transmits and reflects more than it receives")
     typical_u, share = TYPICAL_SYSTEMS[shading_position]
     notes = []
     if u_value is None:

@@ -290,6 +290,7 @@ def _directions(basis: KlemsBasis, patches: NDArray[np.int64], u: float, v: floa
 
 
 FLOAT_GLASS = (0.89, 0.08)  # transmittance and reflectance of the pane whose fall panes are given
+LEAST_PEAK = 0.01  # transmittance at normal incidence below which there is no peak
 SPECULAR = 0.95  # share of what passes, that the beam of a specular system has at least
 EVEN = 0.02  # relative spread of the beam round a ring, of a system that all azimuths are alike to
 STEEPEST = 12.0  # exponent
@@ -337,6 +338,30 @@ def peak_spill(block: NDArray[np.float64], basis: KlemsBasis) -> float:
     half widths at 1/e of 2.3, 3.1 and 5.5 degrees, 0 where it is narrower.
     """
     return _spill(block, basis, _excess(block, basis, 2.0))
+
+
+def peak_kind(bsdf: KlemsBsdf, tree: TensorTreeBsdf | None = None) -> str:
+    """Kind of a transmission peak: "stated", "lobe", "specular" or "undecided"; empty without one.
+
+    Undecided: the data do not show whether light passes straight on or in a narrow lobe.  Solvers
+    take it as specular; `see_through` of the BSDF states the share that passes straight on.
+
+    Args: tree: of the same system, where `bsdf` is its Klems matrices.
+    """
+    bsdf = bsdf.filled()
+    block, basis = bsdf.transmission_front, bsdf.basis_in
+    if block is None:
+        return ""
+    beam = through_peak(block, basis, 1.0).transmittance
+    if beam[0] < LEAST_PEAK:
+        return ""
+    if (bsdf.see_through is not None) if tree is None else (tree.see_through != 1.0):
+        return "stated"
+    if tree is None and peak_spill(block, basis) > SPILL:
+        return "lobe"
+    omega = basis.projected_solid_angles()
+    is_specular = omega @ beam >= SPECULAR * (omega @ bsdf.direct_hemispherical(block))
+    return "specular" if is_specular else "undecided"
 
 
 def _excess(block: NDArray[np.float64], basis: KlemsBasis, contrast: float) -> NDArray[np.float64]:

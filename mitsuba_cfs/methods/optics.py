@@ -12,8 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.bsdf.angular import AngularTable
 from mitsuba_cfs.bsdf.bsdf_file import Bsdf
-from mitsuba_cfs.bsdf.evaluate import klems_of
+from mitsuba_cfs.bsdf.evaluate import klems_of, peak_kind
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL, KlemsBsdf
+from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.trace.kernels.scattering import AngularBeam, AngularScattering, Scattering, patch_beams, sun_scattering
 from mitsuba_cfs.trace.paths.scene import PathOptics, path_optics, without_peaks
@@ -86,6 +87,13 @@ class BsdfOptics:
     def __reduce__(self) -> tuple[type, tuple[object, ...]]:
         """Pickle the data without the forms that have been made."""
         return BsdfOptics, (self._coarse, self._fine, self._angular, self.between)
+
+    @property
+    def peak(self) -> str:
+        """Kind of the transmission peak, see `mitsuba_cfs.bsdf.evaluate.peak_kind`."""
+        if self._angular is not None:
+            return ""
+        return peak_kind(self._coarse, self._fine if isinstance(self._fine, TensorTreeBsdf) else None)
 
     def tinted(self, theta: NDArray[np.float64], factor: NDArray[np.float64]) -> BsdfOptics:
         """The same with its transmission times factors [A] at angles of incidence [A] [rad].
@@ -191,7 +199,7 @@ class AngularOptics:
             )
         }
         for name, values in shares.items():
-            if values.ndim != 1 or len(values) < 2 or (values < 0).any():
+            if values.ndim != 1 or len(values) < 2 or not (values >= 0).all():
                 raise ValueError(f"{name}: expected shares of two angles or more, none negative, got {values}")
         cosine = np.linspace(0.0, 1.0, max(map(len, shares.values())))
         each = [np.interp(cosine, np.linspace(0, 1, len(v)), v) for v in shares.values()]

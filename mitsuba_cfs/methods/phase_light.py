@@ -158,6 +158,11 @@ def phase_light(
     check_systems(systems, matrices.scene.groups)
     if matrices.five_phase and sky.sun is None:
         raise ValueError("the five-phase method needs the sky's sun: annual_sky(..., sun=True)")
+    patches, expected = len(sky.whole), matrices.daylight.values.shape[-1]
+    if patches != expected:
+        raise ValueError(
+            f"sky: has {patches} patches, the matrices {expected}: annual_sky and Sampling need the same subdivision"
+        )
     of_all = [optics for states in systems for optics in states]
     matrices = with_exchange_of(with_needs(matrices, needs, progress=progress), of_all)
     light = PhaseLight(matrices, systems, sky, reflected=reflected)

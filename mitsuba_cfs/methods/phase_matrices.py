@@ -152,8 +152,9 @@ DEFAULT_NEEDS = ("illuminance",)
 class PhaseMatrices:
     """Matrices of a scene's window parts Q; `None` where they have not been traced.
 
-    K are the patches of the full Klems basis, P those of the sky, S the scene's sensors and the
-    view's eye.  An open site has one part for each window group.
+    `sensors` is V [S, Q, K], `daylight` D [Q, K, P], `direct_sensors` V_d and `direct_daylight` D_d; `view` is V of
+    the pixels of a view.  K are the patches of the full Klems basis, P those of the sky, S the scene's sensors and,
+    last, the view's eye.  An open site has one part for each window group.
     """
 
     scene: DaylightScene

@@ -27,6 +27,9 @@ class AdjacentRoom:
     beam: NDArray[np.float64]  # [K] direct transmittance of the group that looks into it
 
 
+IN_FRONT = 0.01  # of a window's plane, from which a surface is not in it [m]
+
+
 @dataclass(frozen=True, slots=True)
 class DaylightScene:
     """Surfaces and window groups of a room, its outdoors, its sensors, and the view of an eye."""
@@ -50,6 +53,20 @@ class DaylightScene:
                 f"{len(self.adjacent)} adjacent rooms for {len(self.groups)} window groups: "
                 "expected one for each group that looks into a room"
             )
+
+        self._check_sides()
+
+    def _check_sides(self) -> None:
+        """Raise `ValueError` for a window whose normal points into the room: it would be dark."""
+        corners = self.interior.triangles.reshape(-1, 3)
+        for group in self.outdoor_groups:
+            for window in group.windows:
+                height = (corners - window.triangles[0, 0]) @ window.normal  # above the window's plane [m]
+                if len(height) and height.max() > IN_FRONT and height.min() > -IN_FRONT:
+                    raise ValueError(
+                        f"window {window.name}: its normal points into the room; "
+                        "expected vertices counter-clockwise seen from outdoors"
+                    )
 
     @property
     def outdoor_groups(self) -> Sequence[WindowGroup]:

@@ -162,7 +162,12 @@ NO_SUN = "the sky was made without the sun alone: annual_sky(sun=True)"
 
 @dataclass(frozen=True, slots=True)
 class AnnualSky:
-    """Skies and suns of some hours L of a year of H hours, by default those with the sun up."""
+    """Skies and suns of some hours L of a year of H hours, by default those with the sun up.
+
+    `lit` [L] are the numbers of these hours in the year, so that `weather.midpoints[sky.lit]` are their times;
+    `whole` [P, L] is the luminance of the patches [cd/m2], `direction` [L, 3] the direction to the sun and
+    `illuminance` [L] that of the sun, normal to its beam [lx].
+    """
 
     whole: NDArray[np.floating]  # [P, L] luminance, the sun among it [cd/m2]
     direction: NDArray[np.float64]  # [L, 3] to the sun

@@ -66,9 +66,7 @@ def _check_weather(rules: Mapping[str, RuleTable], weather: Weather) -> None:
     if any(rule.fits(weather) for rule in rules.values()):
         return
     name, rule = next(iter(rules.items()))
-    message = (
-        f"{name} asks for the weather of {rule.weather_asked}; this is of {weather.site}: there would be no verdict"
-    )
+    message = f"{name} gives no verdict for {weather.site}: it asks for that of {rule.weather_asked}"
     raise DataError(message, file=weather.file, field="--weather")
 
 

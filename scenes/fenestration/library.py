@@ -13,7 +13,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import Field
 
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
@@ -26,7 +25,6 @@ from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import json_text, write_text
 from mitsuba_cfs.progress import Progress, silent
-from scenes.fenestration.ratings import system_ratings
 from scenes.fenestration.systems import read_system
 from scenes.fenestration.thermal_system import checked_system
 from scenes.toml_file import Positive, Share, TomlTable, read_table, validated
@@ -101,7 +99,7 @@ class LibraryFile(TomlTable):
 
 @dataclass(frozen=True, slots=True)
 class Sheet:
-    """Figures of a system at normal incidence; U [W/(m2 K)] and g by ISO 15099 (NFRC)."""
+    """Figures of a system at normal incidence; U [W/(m2 K)] and g as in the heat balance (ISO 15099, 0 and 20 degC)."""
 
     glazing: str
     shade: str  # "": none
@@ -183,16 +181,14 @@ def sheet_of(path: Path, glazing: str, shade: str) -> Sheet:
     heat = checked_system(system, path)
     tau = system.visible.direct_hemispherical(system.visible.blocks()["transmission_front"])
     weights = KLEMS_FULL.projected_solid_angles()
-    rated = {rating.method: rating for rating in system_ratings(system, heat)}
-    nfrc = next(rating for name, rating in rated.items() if name.startswith("NFRC"))
     return Sheet(
         glazing,
         shade,
         float(tau[0]),
         float(weights @ tau / weights.sum()),
         float(heat.transmittance[0]),
-        float(nfrc.u_value or np.nan),
-        nfrc.g_value,
+        heat.fenestration.u_value,
+        float(heat.g_value[0]),
     )
 
 

@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mitsuba_cfs.bsdf.evaluate import HIDDEN, SPECULAR, SPILL, UNRESOLVED, peak_spill, through_peak
+from mitsuba_cfs.bsdf.evaluate import HIDDEN, LEAST_PEAK, UNRESOLVED, peak_kind, through_peak
 from mitsuba_cfs.glare.sun_disc import spread_sun_dgp
 from mitsuba_cfs.notes import Note
 from scenes.fenestration.systems import FenestrationSystem, States, with_see_through
 
 DIM = 10.0  # [lx] at the eye, below which relative changes do not matter
 SAME_DGP, SAME_LIGHT = 0.001, 0.1  # least differences of DGP and of light [%] that are stated
-LEAST_PEAK = 0.01  # transmittance at normal incidence below which a peak is not noted
 
 
 def as_lobes(systems: tuple[States, ...]) -> tuple[States, ...] | None:
@@ -130,21 +129,8 @@ def is_undecided(system: FenestrationSystem) -> bool:
 
 
 def _kind(system: FenestrationSystem) -> str:
-    """What the transmission peak is: stated, lobe, specular or undecided; empty without one."""
-    bsdf, tree = system.visible.filled(), system.tree
-    block, basis = bsdf.transmission_front, bsdf.basis_in
-    if block is None or system.angular is not None:
-        return ""
-    beam = through_peak(block, basis, 1.0).transmittance
-    if beam[0] < LEAST_PEAK:
-        return ""
-    if (bsdf.see_through is not None) if tree is None else (tree.see_through != 1.0):
-        return "stated"
-    if tree is None and peak_spill(block, basis) > SPILL:
-        return "lobe"
-    omega = basis.projected_solid_angles()
-    is_specular = omega @ beam >= SPECULAR * (omega @ bsdf.direct_hemispherical(block))
-    return "specular" if is_specular else "undecided"
+    """See `peak_kind`; none where the optics are a function of the angle."""
+    return "" if system.angular is not None else peak_kind(system.visible, system.tree)
 
 
 def peak_note(system: FenestrationSystem) -> tuple[str, ...]:

@@ -106,7 +106,10 @@ class RoomOptions:
 
     @classmethod
     def of(cls, **choices: Any) -> RoomOptions:
-        """Options by the names of `NAMES`; all others have their defaults."""
+        """Options by name, such as `method="three-phase", sensor_spacing=0.5`; all others have their defaults.
+
+        `RoomOptions().named()` is all names with their defaults; `cfs run --help` has their meaning and units.
+        """
         return cls().changed(**choices)
 
     def changed(self, **choices: Any) -> RoomOptions:

@@ -23,7 +23,7 @@ SAVE_SECONDS = 1.0  # a killed run loses this much work, or the batch under way 
 SAVE_SHARE = 20.0  # ... or so many times what saving takes
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Estimate:
     """An array estimated by Monte Carlo, with the standard error of each entry."""
 
@@ -32,6 +32,11 @@ class Estimate:
     covariance: NDArray[np.float64]  # [..., R, R] of the sums of R blocks of the last axis
     batches: int
     seconds: float
+
+    def __repr__(self) -> str:
+        """Shape, error and time; not the numbers, which are many."""
+        error = f"{self.relative_error:.2g}" if self.values.size else "0"
+        return f"Estimate(shape={self.values.shape}, relative_error={error}, seconds={self.seconds:.3g})"
 
     @property
     def sum_error(self) -> NDArray[np.float64]:
