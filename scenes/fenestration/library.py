@@ -13,9 +13,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field
-
 import numpy as np
+from pydantic import Field
 
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.glazing import Pane, specular_klems

@@ -162,7 +162,7 @@ def peak_note(system: FenestrationSystem) -> tuple[str, ...]:
             "{system}: the transmission peak ({peak:.2f} at normal incidence) is a lobe, as it "
             "spreads into the neighbouring Klems patches: no sun or view passes straight on. In "
             "patches it is wider: DGP is up to {error:.2f} too low where the sun is seen through "
-            "it. If it is specular: --see-through {file}=specular, or see_through in its table.",
+            "it. If it is specular: see_through = 'specular' in its table, or --see-through {file}=specular of cfs run.",
             error=max(spread_sun_dgp(HIDDEN) - spread_sun_dgp((widest / 2 / np.pi) ** 0.5), 0.0),
             **values,
         )
@@ -181,7 +181,7 @@ def peak_note(system: FenestrationSystem) -> tuple[str, ...]:
             "{system}: the data do not show whether the transmission peak ({peak:.2f} at normal "
             "incidence) is specular or a lobe of less than {width:.1f} degrees; it is taken as "
             "specular. As a lobe, DGP is up to {error:.2f} lower where the sun is seen through "
-            "it: --see-through {file}=lobe, or see_through in its table.",
+            "it: see_through = 'lobe' in its table, or --see-through {file}=lobe of cfs run.",
             width=float(np.degrees(width)),
             error=-spread_sun_dgp(width),
             **values,
