@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.glare.indices import DGP_IN_DARK, DGP_PER_LUX
 from mitsuba_cfs.progress import Progress, silent
 from scenes.room.control_year import ControlYear
 from scenes.room.operation import OperationHours
@@ -27,8 +28,8 @@ LIMIT = 0.40  # DGP, the default of `limit_dgp`
 PENALTY = 1e7  # [Wh] for each unit of DGP above the limit: before any energy
 FIXED = 1e9  # [Wh] of a state other than that of a group which several rooms share: before any glare
 CLOSED = 0.1  # [Wh] of an hour with all groups closed: of equal plans the more open one
-# Least DGP by Ev: Wienold and Christoffersen 2006 without sources, less 5 % for the noise of Ev
-LEAST = 0.95 * 5.87e-5, 0.16
+# Least DGP by Ev: without sources, less 5 % for the noise of Ev
+LEAST = 0.95 * DGP_PER_LUX, DGP_IN_DARK
 BY_EYE = 6.2e-5, 0.184  # of AFC's glare term by Ev, after Wienold 2009, equation of DGPs
 SIGMAS = 2.0  # standard errors of the tracing by which the DGP of a picture stays below the limit
 ROUNDS = 25  # of plans, each with the glare of those before

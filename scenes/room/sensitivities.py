@@ -21,6 +21,7 @@ import pandas as pd
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from mitsuba_cfs.glare.indices import ADAPTATION, DGP_IN_DARK, DGP_OF_CONTRAST, DGP_PER_LUX
 from mitsuba_cfs.methods.light import eye_illuminance, illuminance, illuminance_with_noise, relative_error_of_mean
 from mitsuba_cfs.methods.sensitivity import LightDerivative, by_ground, by_reflectances
 from mitsuba_cfs.metrics.schedules import daylight_hours, lm83_hours
@@ -314,15 +315,15 @@ class _LightFigures:
 def dgp_and_slope(dgp: Array, eye: Array) -> tuple[Array, Array]:
     """DGP and its derivative by the vertical illuminance, the glare sources unchanged.
 
-        DGP = 5.87e-5 E_v + 0.0918 log10(1 + sum L^2 omega / (E_v^1.87 P^2)) + 0.16
+        DGP = c1 E_v + c2 log10(1 + sum L^2 omega / (E_v^1.87 P^2)) + c3
 
     The sum follows from DGP and E_v.  Windows, which are the sources, do not change with the room's
     reflectances; with the light through them they do, and the derivative is then too low.
     """
     dgp, eye = np.nan_to_num(dgp), np.maximum(np.nan_to_num(eye), 1.0)
-    contrast = np.maximum((dgp - 0.16 - 5.87e-5 * eye) / 0.0918, 0.0)
+    contrast = np.maximum((dgp - DGP_IN_DARK - DGP_PER_LUX * eye) / DGP_OF_CONTRAST, 0.0)
     ratio = 10.0**contrast
-    slope = 5.87e-5 - 0.0918 / np.log(10.0) * (ratio - 1.0) / ratio * 1.87 / eye
+    slope = DGP_PER_LUX - DGP_OF_CONTRAST / np.log(10.0) * (ratio - 1.0) / ratio * ADAPTATION / eye
     return dgp, slope
 
 

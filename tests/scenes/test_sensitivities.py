@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from bim.shoebox import shoebox
+from mitsuba_cfs.glare.indices import daylight_glare_probability
 from mitsuba_cfs.sky.weather import Weather
 from scenes import read_operation, read_system, read_weather, simulate
 from scenes.demo import VENETIAN_BLIND, WEATHER
@@ -121,7 +122,7 @@ def test_slope_of_dgp_without_and_with_contrast():
     sources = np.array([0.0, 5e6])  # sum of L^2 omega / P^2
 
     def dgp(at: np.ndarray) -> np.ndarray:
-        return 5.87e-5 * at + 0.0918 * np.log10(1 + sources / at**1.87) + 0.16
+        return np.array([daylight_glare_probability(*one) for one in zip(at, sources, strict=True)])
 
     value, slope = dgp_and_slope(dgp(eye), eye)
     np.testing.assert_allclose(value, dgp(eye))
