@@ -5,9 +5,12 @@
 within a series; series are independent.  s is 1 for temperatures, the model's value for light, whose
 errors are relative.  Each step linearises f (Gauss-Newton): sigma and tau maximise the marginal
 likelihood of the linear model, theta integrated out, and theta is then its bounded least squares.
+Where a usual tau is stated, ln(tau) has it as the mean of a normal prior of deviation `LOG_SPREAD`: few
+readings do not tell slow errors from fast ones.
 
-Covariance: C = (J' V^-1 J / k + P^-1)^-1.  k = (t / 1.96)^2, t of Student with the degrees of freedom of
-the effective number of readings, widens what is known from few or correlated readings.
+Covariance: C = (J' V^-1 J / k + P^-1)^-1.  k = (t / 1.96)^2, t of Student, widens what is known from few
+or correlated readings.  Degrees of freedom: effective number of readings less the number of parameters
+that they determine, p - trace(P^-1 C).
 
 Source: restricted likelihood of correlated errors: Harville 1977, doi:10.1080/01621459.1977.10480998.
     Continuous-time first-order autoregression for unequal steps: Jones 1993, "Longitudinal Data with
@@ -35,6 +38,7 @@ SMALLEST = 1e-6  # of a correlation time, in steps: no correlation
 FADED = 0.02  # of the mean reading: least scale of a relative error
 NORMAL = 1.959964  # quantile of 95 %
 LEAST_FREEDOM = 2.0
+LOG_SPREAD = 1.0  # deviation of ln(tau) about that of the usual correlation time
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +50,7 @@ class Readings:
     values: Array  # [n]
     group: str  # of instruments whose errors have one deviation and one correlation time
     relative: bool  # whether errors are shares of the value
+    correlation_h: float | None = None  # usual correlation time of the group's errors; None: any [h]
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +85,7 @@ class FittedValues:
     modelled: Array  # [N] at `value`
     expanded_at: Array  # [p] near `value`, where the derivatives were computed
     noise: dict[str, ReadingNoise]  # by group
+    freedom: float  # degrees of freedom of Student's t for intervals
     steps: int
     converged: bool
 
@@ -139,12 +145,15 @@ def estimate(
     whitener.scale_by(values)
     log_noise = _likeliest_noise(whitener, values, slopes, theta, prior, log_noise)
     noise = whitener.noise(log_noise)
-    free = max(sum(one.effective for one in noise.values()) - len(theta), LEAST_FREEDOM)
-    widened = (student.ppf(0.975, free) / NORMAL) ** 2
+    left = np.diag(_covariance(whitener, log_noise, slopes, prior)) / prior.deviation**2
+    determined = len(theta) - float(left.sum())
+    freedom = max(sum(one.effective for one in noise.values()) - determined, LEAST_FREEDOM)
+    widened = (student.ppf(0.975, freedom) / NORMAL) ** 2
     covariance = _covariance(whitener, log_noise, slopes, prior, widened)
     half = NORMAL * np.sqrt(np.diag(covariance))
     low, high = np.maximum(theta - half, prior.low), np.minimum(theta + half, prior.high)
-    return FittedValues(theta, covariance, low, high, values, of_slopes, noise, steps, done and moved <= NEAR)
+    converged = done and moved <= NEAR
+    return FittedValues(theta, covariance, low, high, values, of_slopes, noise, freedom, steps, converged)
 
 
 def _moved(theta: Array, other: Array, prior: Prior) -> float:
@@ -178,6 +187,8 @@ class _Whitener:
         self.number = [self.groups.index(one.group) for one in readings]
         self.relative = np.concatenate([np.full(len(one.values), one.relative) for one in readings])
         self.scale = np.ones(len(self.y))
+        of_groups = {one.group: one.correlation_h for one in readings}
+        self.usual_log_tau = np.log([of_groups[group] or np.nan for group in self.groups])
 
     def scale_by(self, values: Array) -> None:
         """Take the scales of relative errors from the model's values [N]."""
@@ -231,7 +242,7 @@ class _Whitener:
 def _likeliest_noise(
     w: _Whitener, values: Array, slopes: Array, theta: Array, prior: Prior, known: Array | None
 ) -> Array:
-    """ln sigma, ln tau of each group [2 G] that maximise the marginal likelihood of the linear model.
+    """ln sigma, ln tau of each group [2 G] that are likeliest by the linear model and the usual tau.
 
     Args: known: of the step before, where the search begins; None: it begins at several correlations.
     """
@@ -242,7 +253,9 @@ def _likeliest_noise(
         e, X = w(residual, log_noise), w(spread, log_noise)
         A = X.T @ X + np.eye(X.shape[1])
         b = X.T @ e
-        return 0.5 * float(w.log_determinant(log_noise) + np.linalg.slogdet(A)[1] + e @ e - b @ np.linalg.solve(A, b))
+        unusual = np.nansum(((log_noise[1::2] - w.usual_log_tau) / LOG_SPREAD) ** 2)
+        likelihood = w.log_determinant(log_noise) + np.linalg.slogdet(A)[1] + e @ e - b @ np.linalg.solve(A, b)
+        return 0.5 * float(likelihood + unusual)
 
     limits, first = [], []
     for number, (step, span) in enumerate(w.steps_h()):

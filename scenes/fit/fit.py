@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import tomlkit
 from numpy.typing import NDArray
+from scipy.stats import t as student
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import json_text, write_table, write_text
@@ -25,7 +26,7 @@ Array = NDArray[np.float64]
 PRIOR_SHARE = 0.9  # of the prior's deviation: above it the readings do not determine a parameter
 UNLIKELY = 3.0  # prior deviations: a value farther from its mean contradicts the prior
 CORRELATED = 0.9  # of two parameters: above it only a combination of them is known
-BAND = 1.644854  # quantile of 90 %: intervals of readings
+BAND = 1.644854  # normal quantile of 90 %: intervals of readings
 FITTED_STUDY = "fitted.toml"
 
 
@@ -125,13 +126,14 @@ def _comparison(model: FittedModel, found: FittedValues) -> pd.DataFrame:
     """Each reading beside the fitted model, with the 90 % interval of a single reading."""
     whole, slopes = model.whole(found.value), model.whole_derivatives(found.expanded_at)
     variance = np.einsum("np,pq,nq->n", slopes, found.covariance, slopes)
+    of_noise = float(student.ppf(0.95, found.freedom)) / BAND  # its deviation is estimated
     tables: list[pd.DataFrame] = []
     first = 0
     for one, fitted in zip(model.columns, model.fitted(), strict=True):
         rows = slice(first, first + len(one.values))
         first += len(one.values)
         light = one.light
-        noise = found.noise[LIGHT_NOISE if light else KELVIN_NOISE].deviation
+        noise = of_noise * found.noise[LIGHT_NOISE if light else KELVIN_NOISE].deviation
         scale = np.abs(whole[rows]) if light else np.ones(len(one.values))
         traced = model.tracing_error.get(len(tables), 0.0)
         half = BAND * np.sqrt(variance[rows] + (noise**2 + traced**2) * scale**2)

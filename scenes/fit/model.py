@@ -49,6 +49,7 @@ ALBEDO = ("albedo", "measured.albedo")
 # keys of a box, and the groups of surfaces by which light is derived
 OF_GROUPS = {"box.reflectance.floor": "floor", "box.reflectance.wall": "walls", "box.reflectance.ceiling": "ceiling"}
 KELVIN_NOISE, LIGHT_NOISE = "temperature", "light"  # groups of instruments with one noise
+CORRELATION_H = 12.0  # usual correlation time of errors of temperatures, which last from hours to days
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,8 +141,8 @@ class FittedModel:
         """The readings that are fitted."""
         found = []
         for one, fitted in zip(self.columns, self.fitted(), strict=True):
-            group = LIGHT_NOISE if one.light else KELVIN_NOISE
-            found.append(Readings(one.table.column, one.hours[fitted], one.values[fitted], group, one.light))
+            group, usual = (LIGHT_NOISE, None) if one.light else (KELVIN_NOISE, CORRELATION_H)
+            found.append(Readings(one.table.column, one.hours[fitted], one.values[fitted], group, one.light, usual))
         return found
 
     def prior(self) -> Prior:

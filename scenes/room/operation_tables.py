@@ -131,7 +131,7 @@ class NeighbourAirTable(TomlTable):
     def _has_a_size_or_a_flow(self) -> NeighbourAirTable:
         if (self.width is None) != (self.height is None):
             raise ValueError("width and height belong together")
-        if self.width is None and self.m3_h == 0.0:
+        if self.width is None and "m3_h" not in self.model_fields_set:
             raise ValueError("give `width` and `height` of an opening, or `m3_h`")
         return self
 

@@ -80,6 +80,20 @@ def test_intervals_of_a_line_cover_95_of_100():
     assert (hits <= 190 + 3 * 3.1).all()
 
 
+def test_few_readings_do_not_tell_slow_errors_from_fast_ones():
+    """Six means of six hours, errors that follow each other for 12 h: the intervals know by the usual time."""
+    times, phi, hits = 6.0 * np.arange(6), np.exp(-6.0 / 12.0), {12.0: 0, None: 0}
+    wide = Prior(np.zeros(1), np.full(1, 10.0), np.full(1, -np.inf), np.full(1, np.inf), np.ones(1, dtype=bool))
+    mean = Line(times)
+    mean.slopes = mean.slopes[:, :1]
+    for seed in range(100):
+        y = 3.0 + correlated(6, phi, np.random.default_rng([8, seed]))
+        for usual in hits:
+            found = estimate(mean, [Readings("a", times, y, "a", False, usual)], wide)
+            hits[usual] += bool(found.low[0] <= 3.0 <= found.high[0])
+    assert hits[12.0] >= 92 > hits[None]
+
+
 @pytest.fixture(scope="module")
 def heat(tmp_path_factory):
     """A fit of temperatures, its model, and planted values."""

@@ -80,6 +80,7 @@ def write_fit_page(folder: Path) -> Path:
         wave,
         fit.mean,
         {KELVIN_NOISE: ReadingNoise(0.2, 1.5, 24, 9.0)},
+        7.0,
         4,
         True,
     )

@@ -300,6 +300,9 @@ open = "door"
 [[air.neighbour]]
 temperature_c = "corridor"
 m3_h = 72
+[[air.neighbour]]
+temperature_c = 20
+m3_h = 0
 [schedules.door]
 otherwise = 0.0
 weekday = [{ hours = [8, 18], value = 1.0 }]
@@ -311,12 +314,13 @@ weekend = 15.0
         ),
         weather,
     )
-    door, given = hours.outdoor_air()["beside"]
+    door, given, tight = hours.outdoor_air()["beside"]
     assert door.buoyant == pytest.approx(0.65 / 3 * 0.9 * np.sqrt(9.81 * 2.0**3))
     assert (door.beside_c, door.flow) == (18.0, 0.0)
     assert 0.25 < np.mean(door.share) < 0.35 and set(np.unique(door.share)) == {0.0, 1.0}
     assert (given.buoyant, given.flow) == (0.0, 0.02)
     assert set(np.unique(given.beside_c)) == {15.0, 21.0}
+    assert (tight.buoyant, tight.flow) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(

@@ -12,12 +12,15 @@ Fraunhofer IBP, IEA EBC Annex 58.
 from __future__ import annotations
 
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from mitsuba_cfs.bsdf.angular import AngularTable, specular_matrices
 from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
@@ -27,7 +30,7 @@ from scenes.heat.study import run_study
 from scenes.heat.study_file import read_study
 
 STUDIES = Path(__file__).parents[2] / "docs" / "tutorials"
-FLOOR, VOLUME = 33.24, 86.42  # of the living room [m2], [m3]
+FLOOR, VOLUME, HEIGHT = 33.24, 86.42, 2.60  # of the living room [m2], [m3], [m]
 STEP = pd.Timedelta(minutes=10)
 
 
@@ -42,6 +45,7 @@ class Experiment:
     last: str
     phases: dict[str, slice]
     channels: dict[str, list[int]]  # numbers of its columns, time being 0
+    heights: tuple[float, ...]  # of the living room's thermometers, from below [m]
 
 
 EXPERIMENTS = {
@@ -77,6 +81,7 @@ EXPERIMENTS = {
             "wind": [44],
             "RH": [46],
         },
+        (0.67, 1.25, 1.87),
     ),
     2: Experiment(
         STUDIES / "twin_house_living.toml",
@@ -111,6 +116,7 @@ EXPERIMENTS = {
             "wind": [62],
             "RH": [63],
         },
+        (0.10, 1.10, 1.70),
     ),
 }
 # solar values of the panes by EN 410's spectrum at each 10 degrees, as the house's description has
@@ -126,11 +132,19 @@ def measured(folder: Path, experiment: Experiment) -> pd.DataFrame:
     rows = np.loadtxt(folder / experiment.table, skiprows=2)
     times = pd.Timestamp(experiment.year) + pd.to_timedelta(rows[:, 0], unit="s")
     data = {name: rows[:, numbers].mean(axis=1) for name, numbers in experiment.channels.items()}
+    data["living"] = rows[:, experiment.channels["living"]] @ layer_shares(experiment.heights)
     table = pd.DataFrame(data, index=times.round("min"))
     start = pd.Timestamp(experiment.first) + STEP
     end = pd.Timestamp(experiment.last) + pd.Timedelta(days=1)
     every = pd.date_range(start, end, freq=STEP)  # some rows are missing: linear between others
     return table.reindex(table.index.union(every)).interpolate("time").loc[every]
+
+
+def layer_shares(heights: Sequence[float]) -> NDArray[np.float64]:
+    """Shares of the room's air: each thermometer stands for the layer nearest to it."""
+    between = [0.5 * (low + high) for low, high in pairwise(heights)]
+    shares: NDArray[np.float64] = np.diff([0.0, *between, HEIGHT]) / HEIGHT
+    return shares
 
 
 def write_inputs(data: pd.DataFrame, folder: Path, study: Path) -> Path:
