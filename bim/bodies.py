@@ -50,13 +50,13 @@ class Span:
 
     def since(self, start: float) -> Span:
         """The part from a distance on [m]."""
-        parts = (replace(p, start=max(p.start, start)) for p in self.parts if p.stop > start)
-        return replace(self, start=start, parts=tuple(parts))
+        parts = tuple(Part(p.item, max(p.start, start), p.stop, p.triangle) for p in self.parts if p.stop > start)
+        return Span(self.element, start, self.stop, self.triangle, parts)
 
     def moved(self, by: float) -> Span:
         """The same, all distances less by that [m]."""
-        parts = tuple(replace(p, start=p.start - by, stop=p.stop - by) for p in self.parts)
-        return replace(self, start=self.start - by, stop=self.stop - by, parts=parts)
+        parts = tuple(Part(p.item, p.start - by, p.stop - by, p.triangle) for p in self.parts)
+        return Span(self.element, self.start - by, self.stop - by, self.triangle, parts)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,10 +68,12 @@ class Bodies:
     item: NDArray[np.int64]  # [N] representation item of each triangle
     # [N] whether a triangle is of a closed body that is drawn inside out
     turned: NDArray[np.bool_] = field(init=False)
+    vectors: NDArray[np.float64] = field(init=False)  # [N, 3] area vectors [m2]
 
     def __post_init__(self) -> None:
         body = self.element * (self.item.max(initial=0) + 1) + self.item  # bodies that touch share corners
         object.__setattr__(self, "turned", _inside_out(self.mesh.triangles, body))
+        object.__setattr__(self, "vectors", area_vectors(self.mesh.triangles))
 
     def along(self, origin: NDArray[np.float64], direction: NDArray[np.float64], reach: float) -> list[Span]:
         """The elements that a ray is in within its reach [m], by where it enters them.
@@ -80,19 +82,20 @@ class Bodies:
         within reach.
         """
         distance, hit = self.mesh.all_hits(origin, direction, reach)
-        into = area_vectors(self.mesh.triangles[hit]) @ direction < 0
-        element, items = self.element[hit], self.item[hit]
+        into = self.vectors[hit] @ direction < 0
+        met: dict[int, dict[int, list[Face]]] = {}  # by element and item
+        faces = zip(distance.tolist(), hit.tolist(), into.tolist(), strict=True)
+        for number, item, face in zip(self.element[hit].tolist(), self.item[hit].tolist(), faces, strict=True):
+            met.setdefault(number, {}).setdefault(item, []).append(face)
         spans: list[Span] = []
-        for number in sorted(set(element.tolist())):
+        for number in sorted(met):
             parts: list[Part] = []
-            of_element = element == number
-            for item in sorted(set(items[of_element].tolist())):
-                own = of_element & (items == item)
-                faces = _faces(distance[own], hit[own], into[own])
-                if _depths(faces)[0] > 0:  # the ray begins inside, or the body is inside out
-                    turned = into[own] ^ self.turned[hit[own]]
-                    faces = _faces(distance[own], hit[own], turned)
-                parts += self._parts(number, item, faces, origin, direction, reach=reach)
+            for item in sorted(met[number]):
+                of_body = met[number][item]
+                distinct = _distinct(of_body)
+                if _depths(distinct)[0] > 0:  # the ray begins inside, or the body is inside out
+                    distinct = _distinct([(at, k, inwards ^ bool(self.turned[k])) for at, k, inwards in of_body])
+                parts += self._parts(number, item, distinct, origin, direction, reach=reach)
             spans += _joined(number, parts)
         return sorted(spans, key=lambda span: (span.start, span.stop))
 
@@ -142,15 +145,15 @@ def _joined(number: int, parts: list[Part]) -> list[Span]:
     return spans
 
 
-def _faces(distance: NDArray[np.float64], hit: NDArray[np.int64], into: NDArray[np.bool_]) -> list[Face]:
-    """Faces of one element along a ray, those in one place once each way, the way in first."""
-    faces: dict[tuple[int, bool], Face] = {}
-    place, before = 0, float(distance[0])
-    for face in zip(distance.tolist(), hit.tolist(), into.tolist(), strict=True):
+def _distinct(faces: Sequence[Face]) -> list[Face]:
+    """Faces of one body along a ray, those in one place once each way, the way in first."""
+    kept: dict[tuple[int, bool], Face] = {}
+    place, before = 0, faces[0][0]
+    for face in faces:
         place += face[0] - before > SAME_PLACE
         before = face[0]
-        faces.setdefault((place, not face[2]), face)
-    return [faces[key] for key in sorted(faces)]
+        kept.setdefault((place, not face[2]), face)
+    return [kept[key] for key in sorted(kept)]
 
 
 def _depths(faces: Sequence[Face]) -> list[int]:

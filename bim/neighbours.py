@@ -74,6 +74,7 @@ def cut_by_neighbours(
     near = [rooms[index] for index in around if rooms[index].guid != room.guid]
     facets = [(other.guid, facet) for other in near for facet in other.facets]
     normals = np.array([facet.plane.normal for _, facet in facets]).reshape(-1, 3)
+    corners = [facet.plane.to_world(shapely.get_coordinates(facet.polygon)) for _, facet in facets]
     result: list[Piece] = []
     for piece in pieces:
         if piece.role == "glass":
@@ -81,7 +82,7 @@ def cut_by_neighbours(
             continue
         rest = [piece.facet.polygon]
         towards = np.flatnonzero(normals @ piece.facet.plane.normal <= OPPOSITE)
-        for _, guid, region in _opposite(piece.facet, [facets[i] for i in towards]):
+        for _, guid, region in _opposite(piece.facet, [(*facets[i], corners[i]) for i in towards]):
             left: list[shapely.Polygon] = []
             for polygon in rest:
                 inside, outside = cut(polygon, region)
@@ -92,20 +93,24 @@ def cut_by_neighbours(
     return result
 
 
-def _opposite(facet: Facet, towards: Sequence[tuple[str, Facet]]) -> list[tuple[float, str, shapely.Geometry]]:
+def _opposite(
+    facet: Facet, towards: Sequence[tuple[str, Facet, NDArray[np.float64]]]
+) -> list[tuple[float, str, shapely.Geometry]]:
     """Distance, room and outline in the facet's plane of the faces opposite, nearest first.
 
-    Args: towards: rooms and their facets that face this one.
+    Args: towards: rooms, their facets that face this one, and the facets' corners [N, 3].
     """
+    left, low, right, high = facet.polygon.bounds
     faces = []
-    for guid, other in towards:
-        corners = other.plane.to_world(shapely.get_coordinates(other.polygon))
+    for guid, other, corners in towards:
         distance = float(np.mean((corners - facet.plane.origin) @ facet.plane.normal))
         if not -0.05 < distance < DEEPEST_WALL:
             continue
-        region = shapely.transform(
-            other.polygon, lambda p, other=other: facet.plane.to_plane(other.plane.to_world(p))[:, :2]
-        )
+        flat = facet.plane.to_plane(corners)[:, :2]
+        (x_low, y_low), (x_high, y_high) = flat.min(axis=0), flat.max(axis=0)
+        if x_low > right or x_high < left or y_low > high or y_high < low:
+            continue
+        region = shapely.transform(other.polygon, lambda _, flat=flat: flat)
         region = shapely.make_valid(region).intersection(facet.polygon)
         if polygons := polygons_of(region):
             faces.append((distance, guid, shapely.union_all(polygons)))
@@ -139,7 +144,7 @@ def what_lies_beyond(piece: Piece, around: Surroundings, own: int) -> Beyond:
     if piece.role == "reveal":  # the ray runs along the wall, not through it
         points = points[:1]
     back = DEEPEST_IN_ROOM if piece.role == "room" else INSIDE
-    walks = _without_fittings([_walk(p, normal, around, own, back=back) for p in points])
+    walks = _without_fittings(_walks(points, normal, around, own, back=back))
     chains = {i: tuple(span.element for span in walk.spans) for i, walk in enumerate(walks)}
     firsts = {i: chain[:1] for i, chain in chains.items()}
     twice = {i: what for i, what in firsts.items() if what and [*firsts.values()].count(what) > 1}
@@ -182,21 +187,45 @@ def _adjacency(point: NDArray[np.float64], walk: Walk, normal: NDArray[np.float6
     return _open_or_ground(point + normal * (stop + 0.02), normal, around)
 
 
-def _walk(
-    point: NDArray[np.float64], normal: NDArray[np.float64], around: Surroundings, own: int, *, back: float
-) -> Walk:
-    """What a ray out of a face meets, asked from so far back in the room [m]."""
-    limit, room = DEEPEST_WALL, -1
-    at, t = point + 0.005 * normal, INSIDE + 0.005
+def _walks(
+    points: NDArray[np.float64], normal: NDArray[np.float64], around: Surroundings, own: int, *, back: float
+) -> list[Walk]:
+    """What rays out of points [N, 3] of a face meet, asked from so far back in the room [m]."""
+    limits, rooms = [DEEPEST_WALL] * len(points), [-1] * len(points)
+    at, passed = points + 0.005 * normal, [INSIDE + 0.005] * len(points)
+    free = [*range(len(points))]
     for _ in range(4):  # the first surface met may be the room's own, drawn twice
-        d, hit = around.rooms.first_hits(at[None], normal[None], limit)
-        if hit[0] < 0:
+        distances, hits = around.rooms.first_hits(at[free], np.tile(normal, (len(free), 1)), DEEPEST_WALL)
+        own_face = []
+        for i, distance, hit in zip(free, distances, hits, strict=True):
+            if hit < 0:
+                continue
+            passed[i] += distance
+            if around.room[hit] != own:
+                limits[i], rooms[i] = passed[i], int(around.room[hit])
+                continue
+            at[i] += (distance + 1e-4) * normal
+            passed[i] += 1e-4
+            own_face.append(i)
+        free = own_face
+        if not free:
             break
-        t += d[0]
-        if around.room[hit[0]] != own:
-            limit, room = t, int(around.room[hit[0]])
-            break
-        at, t = at + (d[0] + 1e-4) * normal, t + 1e-4
+    return [
+        _walk(point, normal, around, limit=limit, room=room, back=back)
+        for point, limit, room in zip(points, limits, rooms, strict=True)
+    ]
+
+
+def _walk(
+    point: NDArray[np.float64],
+    normal: NDArray[np.float64],
+    around: Surroundings,
+    *,
+    limit: float,
+    room: int,
+    back: float,
+) -> Walk:
+    """What a ray out of a face meets until it enters another room, -1: none, at `limit` [m]."""
     spans = _at_the_face(around.bodies, point, normal, limit - INSIDE, back)
     spans = _of_one_wall(spans, around, normal)
     stop = max((span.stop for span in spans), default=0.0)

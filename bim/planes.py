@@ -100,8 +100,11 @@ def merged_polygons(flat: NDArray[np.float64]) -> list[shapely.Polygon]:
 
 def polygons_of(geometry: shapely.Geometry) -> list[shapely.Polygon]:
     """The polygons in any geometry that are more than dust."""
-    parts = shapely.get_parts(shapely.get_parts(shapely.get_parts(geometry)))
-    return [part for part in parts if part.geom_type == "Polygon" and part.area > SMALLEST_AREA]
+    if isinstance(geometry, shapely.Polygon):
+        return [geometry] if geometry.area > SMALLEST_AREA else []
+    if not isinstance(geometry, shapely.geometry.base.BaseMultipartGeometry):
+        return []
+    return [polygon for part in geometry.geoms for polygon in polygons_of(part)]
 
 
 def without_slits(geometry: shapely.Geometry, width: float) -> shapely.Geometry:
