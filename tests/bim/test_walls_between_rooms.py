@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 import shapely
@@ -14,8 +16,11 @@ from bim.rooms import Piece
 from tests.bim.test_eaves import ROOM, SOUTH, body
 
 
-def between(begins: float, *bodies: np.ndarray) -> Beyond:
-    """What a room has behind its southern face, where the next room begins so far behind it [m]."""
+def between(begins: float, *bodies: np.ndarray, again: Sequence[np.ndarray] = ()) -> Beyond:
+    """What a room has behind its southern face, where the next room begins so far behind it [m].
+
+    Args: again: further bodies of the own room.
+    """
     own, other = body(*ROOM), body((0.0, -4.0, 0.0), (4.0, -begins, 2.7))
     counts = [len(one) for one in bodies]
     around = Surroundings(
@@ -24,8 +29,8 @@ def between(begins: float, *bodies: np.ndarray) -> Beyond:
             np.repeat(np.arange(len(counts)), counts),
             np.zeros(sum(counts), dtype=int),
         ),
-        ray_mesh(np.concatenate([own, other])),
-        np.repeat([0, 1], 12),
+        ray_mesh(np.concatenate([own, other, *again])),
+        np.repeat([0, 1, *(0 for _ in again)], 12),
         ("own", "other"),
         -0.5,
     )
@@ -39,6 +44,13 @@ def test_the_ray_comes_out_of_the_wall(begins):
     assert (found.adjacency, found.neighbour) == ("space", "other")
     (span,) = found.spans
     assert (span.start, span.stop) == pytest.approx((0.0, 0.3), abs=1e-9)
+
+
+def test_faces_of_the_own_room_that_are_drawn_again_are_passed():
+    """Before some of the points that are asked: those find the next room too."""
+    again = [body((0.0, -0.02, 0.0), (4.0, 1.0, 2.7)), body((0.0, -0.05, 0.0), (2.1, 1.0, 2.7))]
+    found = between(0.3, body((-1.0, -0.3, -0.2), (5.0, 0.0, 4.0)), again=again)
+    assert (found.adjacency, found.neighbour) == ("space", "other")
 
 
 def test_a_door_leaf_that_stands_into_the_next_room_is_thin():
