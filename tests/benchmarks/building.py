@@ -15,7 +15,8 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import wraps
 from importlib import import_module
@@ -111,30 +112,43 @@ def measure(clock: Clock) -> None:
                     place.update({key: measured for key in place if place[key] is function})
 
 
-def main(building: Path, *, weather: Path, cfs: Path, space: Sequence[str] = (), cached: bool = False) -> None:
-    """Print a line for each part."""
+@contextmanager
+def clocked() -> Iterator[Clock]:
+    """Measure by part what runs within, imports included."""
     started = time.process_time()
     for name in LOADED:
         import_module(name)
     import drjit as dr
 
     from mitsuba_cfs import variants
-    from scenes.cli import main as command
 
     variants.activate()
     clock = Clock()
     clock.parts["imports"].seconds = time.process_time() - started
     measure(clock)
-    with tempfile.TemporaryDirectory() as out, dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        yield clock
+        clock.turn()
+
+
+def run_command(arguments: Sequence[str]) -> None:
+    """Run a line of `cfs` in this process."""
+    from scenes.cli import main as command
+
+    sys.argv = ["cfs", *arguments]
+    try:
+        command()
+    except SystemExit as end:
+        if end.code:
+            raise
+
+
+def main(building: Path, *, weather: Path, cfs: Path, space: Sequence[str] = (), cached: bool = False) -> None:
+    """Print a line for each part."""
+    with tempfile.TemporaryDirectory() as out, clocked() as clock:
         line = [building, "--weather", weather, "--cfs", cfs, "--quick", "--out", Path(out) / "out"]
         rooms = [text for one in space for text in ("--space", one)]
-        sys.argv = ["cfs", "run", *map(str, line), *rooms, *([] if cached else ["--no-cache"])]
-        try:
-            command()
-        except SystemExit as end:
-            if end.code:
-                raise
-        clock.turn()
+        run_command(["run", *map(str, line), *rooms, *([] if cached else ["--no-cache"])])
     for name, part in sorted(clock.parts.items(), key=lambda item: -item[1].seconds):
         kernels = f"{part.launches:6d} launches {part.kernel_seconds:7.2f} s in kernels"
         print(f"{name:26} {part.seconds:7.2f} s {part.calls:5d} calls {kernels}")
