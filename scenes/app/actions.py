@@ -10,7 +10,7 @@ from typing import Any
 
 from bim.ifc.corrections import corrections_file
 from mitsuba_cfs.errors import DataError
-from scenes.app.project import INPUTS, RESULTS, STUDY, USES, Project, slug
+from scenes.app.project import INPUTS, PAGE, RESULTS, STUDY, USES, Project, slug
 from scenes.language.catalogue import gettext
 
 CHECK = f"{RESULTS}/check.json"
@@ -43,10 +43,10 @@ class Action:
 
 def check(project: Project) -> Action:
     """Read the building: rooms, windows, problems and the 3D model."""
-    files = _files(project)
-    around = [part for one in project.study().get("surroundings", []) for part in _pair(one)]
+    files, study = _files(project), project.study()
+    around = [part for one in study.get("surroundings", []) for part in _pair(one)]
     html = f"{RESULTS}/check.html"
-    command = ("check", *files, *around, "--json", CHECK, "--html", html)
+    command = ("check", *files, *_joined(study), *around, "--json", CHECK, "--html", html)
     return Action("check", ", ".join(Path(one).name for one in files), command, CHECK)
 
 
@@ -79,6 +79,7 @@ def computations(project: Project, wanted: Mapping[str, Any]) -> list[Action]:
     if not isinstance(standards, list) or not all(isinstance(one, str) for one in standards):
         raise DataError("expected names of rule sets", field="standards")
     pages = ("--language", language) if language != "en" else ()
+    titled = ("--page", PAGE) if (project.folder / PAGE).is_file() else ()
     actions: list[Action] = []
     for system, name in zip(systems, _folders(systems), strict=True):
         shared = _inputs(project, study)
@@ -87,14 +88,14 @@ def computations(project: Project, wanted: Mapping[str, Any]) -> list[Action]:
             command += ["--annual-glare"] if wanted.get("annual_glare") else []
             command += ["--explore"] if wanted.get("explore") else []
             out = f"{RESULTS}/report-{name}"
-            actions.append(Action("run", _name(system), (*command, *pages, "--out", out), out))
+            actions.append(Action("run", _name(system), (*command, *titled, *pages, "--out", out), out))
         if standards:
             command = ["comply", *shared, *_states(project, system), *_options(study)]
             command += [part for one in standards for part in ("--standard", one)]
             command += ["--annual-glare"] if wanted.get("annual_glare") else []
             command += ["--uses", USES] if (project.folder / USES).is_file() else []
             out = f"{RESULTS}/rules-{name}"
-            actions.append(Action("comply", _name(system), (*command, *pages, "--out", out), out))
+            actions.append(Action("comply", _name(system), (*command, *titled, *pages, "--out", out), out))
     if wanted.get("compare"):
         _weather(study)
         _files(project)
@@ -210,9 +211,12 @@ def _entry(study: Mapping[str, Any]) -> Mapping[str, Any]:
 def _rooms(study: Mapping[str, Any]) -> list[str]:
     entry = _entry(study)
     flags = [part for one in entry.get("spaces", []) for part in ("--space", one)]
-    flags += [part for one in entry.get("join", []) for part in ("--join", one)]
-    flags += ["--furniture"] if entry.get("furniture") else []
+    flags += [*_joined(study), *(["--furniture"] if entry.get("furniture") else [])]
     return flags + [part for one in study.get("surroundings", []) for part in _pair(one)]
+
+
+def _joined(study: Mapping[str, Any]) -> list[str]:
+    return [part for one in _entry(study).get("join", []) for part in ("--join", one)]
 
 
 def _inputs(project: Project, study: Mapping[str, Any]) -> list[str]:

@@ -187,6 +187,7 @@ class Jobs:
         """The exit code of a command, whose output is shown and logged."""
         folder = self._project.folder / LOGS
         folder.mkdir(exist_ok=True)
+        (self._project.folder / job.action.out).parent.mkdir(parents=True, exist_ok=True)
         log = folder / f"{time.strftime('%Y%m%d-%H%M%S')}-{job.number}.txt"
         with log.open("w", encoding="utf-8") as file, self._start(job.action) as process:
             with self._changed:

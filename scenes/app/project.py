@@ -3,6 +3,7 @@
     inputs/             building, weather, systems, surroundings
     study.toml          rooms, systems, weather, options: a study file, see docs/studies.md
     operation.toml      gains and set points, where some are chosen
+    page.toml           title of the pages, where one is stated
     uses.toml           uses of rooms that the page states, for `cfs comply --uses`
     results/NAME/       what the commands write
     commands.jsonl      every command that was run, when, and how it ended
@@ -32,6 +33,7 @@ from tomlkit.items import AoT, Table
 
 from bim.building_file import check_building_file
 from bim.ifc.corrections import corrections_file, read_corrections
+from bim.names import JOINT
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import json_text, reason, write_text
 from scenes.comply.uses import UsesFile
@@ -42,7 +44,8 @@ from scenes.study.study_file import Study
 from scenes.toml_file import check_kinds, read_table
 
 INPUTS, RESULTS, LOGS = "inputs", "results", "log"
-STUDY, OPERATION, USES, JOURNAL = "study.toml", "operation.toml", "uses.toml", "commands.jsonl"
+STUDY, OPERATION, USES, PAGE = "study.toml", "operation.toml", "uses.toml", "page.toml"
+JOURNAL = "commands.jsonl"
 BUILDINGS = (".ifc", ".ifczip", ".hbjson", ".gbxml", ".rad")
 WEATHER = (".epw",)
 AROUND = (".obj", ".stl", ".ply", ".gltf", ".glb", ".cityjson", ".gml", ".geojson", ".hor")
@@ -315,7 +318,8 @@ class Project:
             entry = {}
             rooms.insert(0, entry)
         if entry.get("building") != files[0]:
-            entry.pop("spaces", None)
+            for key in ("spaces", "join"):
+                entry.pop(key, None)
             entry["name"] = Path(files[0]).stem
         entry |= {"building": files[0], "linked": list(files[1:])}
         if not entry["linked"]:
@@ -340,7 +344,10 @@ class Project:
         self.write_study(study)
 
     def _change_title(self, study: dict[str, Any], value: Any) -> None:
+        """The title of the comparison, of reports and of dossiers."""
         study["title"] = _text(value, "title")
+        path = self.folder / PAGE
+        write_table(path, (_finite_table(path) if path.is_file() else {}) | {"title": study["title"]}, head=WRITTEN)
 
     def _change_spaces(self, study: dict[str, Any], value: Any) -> None:
         entry = next((one for one in study.get("room", []) if "building" in one), None)
@@ -349,6 +356,19 @@ class Project:
         entry["spaces"] = [_text(one, "spaces") for one in _list(value, "spaces")]
         if not entry["spaces"]:
             del entry["spaces"]
+
+    def _change_join(self, study: dict[str, Any], value: Any) -> None:
+        """Rooms that are to be one, each group as "Hall + Living"."""
+        entry = next((one for one in study.get("room", []) if "building" in one), None)
+        if entry is None:
+            raise DataError("there is no building yet", field="join")
+        groups = [_text(one, "join") for one in _list(value, "join")]
+        for group in groups:
+            if group.startswith("-") or len(group.split(JOINT)) < 2:
+                raise DataError(f"expected two names of rooms with {JOINT.strip()!r} between", field="join")
+        entry["join"] = list(dict.fromkeys(groups))
+        if not entry["join"]:
+            del entry["join"]
 
     def _change_furniture(self, study: dict[str, Any], value: Any) -> None:
         for entry in study.get("room", []):
@@ -544,6 +564,7 @@ SYSTEM_KEYS = ("name", "bsdf", "operation", "u_value", "g_value", "see_through")
 CHANGES = {
     "title": Project._change_title,
     "spaces": Project._change_spaces,
+    "join": Project._change_join,
     "furniture": Project._change_furniture,
     "systems": Project._change_systems,
     "quick": Project._change_quick,

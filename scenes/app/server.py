@@ -38,6 +38,8 @@ from scenes.app.jobs import Jobs
 from scenes.app.project import GAINS, INPUTS, LOADS, RESULTS, MadeSystem, Project, plain_name
 from scenes.explore.folder import script_words
 from scenes.fenestration.library import Sheet, glazing_entry, library, shade_entry, sheets
+from scenes.head import FAR_SITE_DEG
+from scenes.input_files import read_weather
 from scenes.language.catalogue import gettext, in_language
 from scenes.report.names import quantity
 from scenes.report.page import FILES, environment
@@ -370,8 +372,10 @@ class AppServer:
             "files": [asdict(file) for file in self._project.files()],
             "building": self._project.building(),
             "spaces": entry.get("spaces", []),
+            "join": entry.get("join", []),
             "furniture": entry.get("furniture", False),
             "weather": [one.get("weather") for one in study.get("climate", [])],
+            "station": self._station(study),
             "surroundings": study.get("surroundings", []),
             "systems": systems,
             "sheets": self._sheets(systems),
@@ -386,6 +390,18 @@ class AppServer:
             "exported": self._project.exported(),
             "journal": journal[-50:],
         }
+
+    def _station(self, study: Mapping[str, Any]) -> dict[str, Any] | None:
+        """Place of the weather station, and from which difference of degrees it is far; None where unknown."""
+        file = next((one["weather"] for one in study.get("climate", []) if one.get("weather")), None)
+        path = self._project.folder / str(file)
+        if file is None or not path.is_file():
+            return None
+        status = path.stat()
+        try:
+            return _station(path, status.st_mtime_ns, status.st_size)
+        except DataError:  # a file that was changed since: a command names its fault
+            return None
 
     async def _news(self, request: Request) -> Any:
         """The commands, once they differ from what the page has."""
@@ -433,6 +449,8 @@ class AppServer:
         titles = [glazing_entry(glazing).title]
         titles = [shade_entry(shade).title, *titles] if shade else titles
         moving = bool(shade) and wanted.get("moving") is True
+        if moving and shade_entry(shade).fixed:
+            raise DataError(f"{shade} is fixed: it cannot move", field="moving")
         files = [actions.library_file(glazing, shade)]
         files = [actions.library_file(glazing, ""), *files] if moving else files
         missing = [one for one in files if not (self._project.folder / one).is_file()]
@@ -503,7 +521,7 @@ class AppServer:
     async def _change(self, request: Request) -> Any:
         wanted = await _body(request)
         await asyncio.to_thread(self._project.change, wanted)
-        if "corrections" in wanted:
+        if "corrections" in wanted or "join" in wanted:
             self._jobs.add([actions.check(self._project)])
         return self._facts()
 
@@ -538,6 +556,13 @@ class AppServer:
         return None
 
 
+@lru_cache(maxsize=8)
+def _station(path: Path, _time: int, _size: int) -> dict[str, Any]:
+    weather = read_weather(path)
+    place = {"latitude_deg": weather.latitude_deg, "longitude_deg": weather.longitude_deg}
+    return {"name": weather.site, **place, "far_deg": FAR_SITE_DEG}
+
+
 def _result_title(folder: str, titles: Mapping[str, str]) -> str:
     """The system that a folder of results is of, as the page names it."""
     kind, _, rest = folder.partition("-")
@@ -554,12 +579,12 @@ def _library_facts() -> dict[str, Any]:
     known = library()
     return {
         "glazings": [_entry_facts(one.name, one.title, one.source) for one in known.glazing],
-        "shades": [_entry_facts(one.name, one.title, one.source) for one in known.shade],
+        "shades": [_entry_facts(one.name, one.title, one.source) | {"fixed": one.fixed} for one in known.shade],
         "sheets": [asdict(one) for one in sheets().values()],
     }
 
 
-def _entry_facts(name: str, title: str, source: str) -> dict[str, str]:
+def _entry_facts(name: str, title: str, source: str) -> dict[str, str | bool]:
     return {"name": name, "title": gettext(title), "source": gettext(source)}
 
 

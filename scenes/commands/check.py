@@ -99,9 +99,8 @@ def command(
     known = known_fenestration(spaces, options.building)
     # a file or a program that reads on gets every line whole, however long
     console = Console(width=None if Console().is_terminal else UNCUT)
-    head = head_of(read, light_only=True).with_assumptions(
-        known.notes("a run needs a system for them: --cfs, or step 3 of cfs app")
-    )
+    of_model = head_of(read, light_only=True)
+    head = of_model.with_assumptions(known.notes("a run needs a system for them: --cfs, or step 3 of cfs app"))
     lines = (*head.model, *(f"assumed: {text}" for text in head.assumed))
     for line in lines:
         console.print(line, markup=False, highlight=False)
@@ -139,7 +138,8 @@ def command(
 
         uses = uses_of_rooms(read, read.spaces, read_uses(), options.linked)
         facts = {guid: (use.key, str(use.source), use.assumed) for guid, use in uses.items()}
-        data = check_record(read, lines, facts, glazing_data(read.spaces, options.building))
+        stated = (*of_model.model, *(f"assumed: {text}" for text in of_model.assumed))  # windows state their glazing
+        data = check_record(read, stated, facts, glazing_data(read.spaces, options.building))
         write_text(record, json_text(data, ensure_ascii=False) + "\n")
         console.print(f"data: {record}", markup=False, highlight=False)
     if issues is not None:

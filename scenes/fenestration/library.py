@@ -82,6 +82,7 @@ class ShadeEntry(TomlTable):
     title: str
     source: str
     place: Literal["external", "internal"]
+    fixed: bool = False  # it cannot be drawn up
     slats: SlatEntry | None = None
     holes: HoleEntry | None = None
     reflectance: Share = 0.5  # of slats and sheets, in both bands

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from scenes.language.catalogue import gettext, ngettext
-from scenes.language.numbers import inside, listed, rounded, semicolons
-from scenes.report.headline import GLARE_OF_PICTURES, GLARE_OF_YEAR, POOR, Card
+from scenes.language.numbers import colon, inside, listed, rounded, semicolons
+from scenes.report.headline import GLARE_OF_PICTURES, POOR, Card
 
 MOST_NAMED = 4  # rooms or systems that are named in one sentence
 
@@ -33,14 +33,21 @@ class Judged:
 
 
 def judged(name: str, cards: Sequence[Card]) -> Judged:
-    """The limited figures among the headline figures of a room or case.
+    """The figures among the headline figures of a room or case whose limit is that of a standard.
 
-    The highest DGP of some pictures counts only where the protection from glare is unknown.
+    The highest DGP of some pictures has none: EN 17037 limits the glare of the year.
     """
-    limited = [card for card in cards if card.verdict]
-    if any(card.code == GLARE_OF_YEAR for card in limited):
-        limited = [card for card in limited if card.code != GLARE_OF_PICTURES]
-    return Judged(name, tuple(limited))
+    return Judged(name, tuple(card for card in cards if card.verdict and card.code != GLARE_OF_PICTURES))
+
+
+def limits_counted(cases: Sequence[Judged]) -> str:
+    """A sentence on the limits that the answers count, by their standard; empty where none has one."""
+    labels: dict[str, list[str]] = {}
+    for card in (card for case in cases for card in case.cards if card.standard):
+        known = labels.setdefault(card.standard, [])
+        known += [] if card.label in known else [card.label]
+    parts = [colon(standard, listed([inside(label) for label in own])) for standard, own in labels.items()]
+    return gettext("Limits counted: {parts}.", parts=semicolons(parts)) if parts else ""
 
 
 def rooms_answer(rooms: Sequence[Judged]) -> str:
@@ -176,12 +183,18 @@ def _alone(room: Judged) -> str:
 
 
 def _names(cards: Sequence[Card]) -> str:
-    return listed([inside(card.label) for card in cards])
+    return listed([_named(card) for card in cards])
+
+
+def _named(card: Card) -> str:
+    """A figure and its standard."""
+    return f"{inside(card.label)} ({card.standard})" if card.standard else inside(card.label)
 
 
 def _values(cards: Sequence[Card]) -> str:
     """Each figure with its value."""
-    return listed([f"{inside(c.label)} ({f'{inside(c.value)} {c.unit}'.strip()})" for c in cards])
+    values = [(c, f"{inside(c.value)} {c.unit}".strip()) for c in cards]
+    return listed([f"{inside(c.label)} ({colon(c.standard, text) if c.standard else text})" for c, text in values])
 
 
 def _fails(case: Judged, figures: Callable[[Sequence[Card]], str] = _values) -> str:

@@ -25,6 +25,7 @@ PROTECTION = {  # DGP of EN 17037's levels, the best first
     "none": N_("above 0.45"),
 }
 LEVEL_WORDS = {"high": N_("high"), "medium": N_("medium"), "minimum": N_("minimum"), "none": N_("none")}
+LM_83, EN_17037 = "LM-83", "EN 17037"  # standards of limits
 GOOD, FAIR, POOR, PLAIN = "good", "fair", "poor", "plain"
 GLARE_OF_PICTURES, GLARE_OF_YEAR = "glare of pictures", "glare of the year"
 
@@ -44,6 +45,7 @@ class Card:
     traced: bool = False  # its error is that of the illuminances
     error: str = ""  # standard error of this figure, where it is known
     worth: float = 0.0  # orders rooms by this figure: the more the better
+    standard: str = ""  # whose limit the verdict is of
     code: str = ""  # GLARE_OF_PICTURES, GLARE_OF_YEAR: figures of the same matter
 
 
@@ -105,6 +107,11 @@ def heated(room: RoomYear) -> str:
     return gettext("With cooling.") if cooling else gettext("Without heating and cooling.")
 
 
+def cooled(room: RoomYear) -> bool:
+    """Whether the room is cooled by machine, for which adaptive comfort does not hold (ASHRAE 55, EN 16798-1)."""
+    return room.operation is not None and room.operation.summary["cooling_kwh"] > 0
+
+
 def applicable(comfort: pd.DataFrame) -> pd.Series:
     """Hours [H] whose weather the comfort model covers."""
     if "applicable" in comfort:
@@ -129,7 +136,7 @@ def _spatial_autonomy(room: RoomYear) -> Card | None:
     card = _of_plane(value, gettext("Spatial daylight autonomy"), words, "sda300_50", (grade, verdict))
     own = room_metric(room, "sda300_50_standard_error")
     error = "" if own is None else points_error(own)
-    return replace(card, worth=value, error=error)
+    return replace(card, worth=value, error=error, standard=LM_83)
 
 
 def points_error(value: float) -> str:
@@ -146,7 +153,7 @@ def _sunlight(room: RoomYear) -> Card | None:
     grade, verdict = (GOOD, gettext("at most 10 % (LM-83)")) if value <= 10 else (POOR, gettext("above 10 % (LM-83)"))
     words = gettext("of the work plane receives more than 1000 lx of direct sun in more than 250 occupied hours a year")
     label = gettext("Annual sunlight exposure")
-    return replace(_of_plane(value, label, words, "ase1000_250", (grade, verdict)), worth=-value)
+    return replace(_of_plane(value, label, words, "ase1000_250", (grade, verdict)), worth=-value, standard=LM_83)
 
 
 def _of_plane(value: float, label: str, words: str, key: str, judged: tuple[str, str]) -> Card:
@@ -171,8 +178,13 @@ def _autonomy(room: RoomYear) -> Card | None:
     return Card(gettext("Daylight autonomy"), percent(mean), "%", words, meaning=meaning, meter=mean)
 
 
+def moves(room: RoomYear) -> bool:
+    """Whether the room's shading moves between states."""
+    return room.operation is not None and len(room.operation.states) > 1
+
+
 def _provision(room: RoomYear) -> Card | None:
-    """The level of EN 17037, with the two illuminances that decide it."""
+    """The level of EN 17037, with the two illuminances that decide it, and in which state of the shading."""
     metrics = room.daylight.room_metrics
     q = quantity("en17037_level")
     level = metrics.get("en17037_level")
@@ -193,6 +205,8 @@ def _provision(room: RoomYear) -> Card | None:
     verdict = (
         gettext("{target} and {least} lx", **limits) if index else gettext("below {target} and {least} lx", **limits)
     )
+    shading = gettext("shading as it moves") if moves(room) else gettext("one state of the shading")
+    verdict = f"{verdict} ({shading})"
     grade = (POOR, FAIR, GOOD, GOOD)[index]
     return Card(
         gettext("Daylight provision"),
@@ -204,6 +218,7 @@ def _provision(room: RoomYear) -> Card | None:
         q.meaning,
         traced=True,
         worth=index,
+        standard=EN_17037,
     )
 
 
@@ -276,6 +291,7 @@ def protection_card(level: str, noise: float | None, words: str = "", worth: flo
         quantity("dgp").meaning,
         error="" if noise is None else gettext("{error} of an hour's DGP", error=dgp_error(noise)),
         worth=float(order) if worth is None else worth,
+        standard=EN_17037,
         code=GLARE_OF_YEAR,
     )
 
@@ -309,7 +325,7 @@ def _comfort(room: RoomYear) -> Card | None:
     comfort = room.heat.comfort
     columns = comfort_columns(comfort)
     used = occupied(room)
-    if not columns or not used.any():
+    if not columns or not used.any() or cooled(room):
         return None
     widest = columns[-1]
     value = 100 * float(comfort.loc[used, widest].mean())

@@ -15,6 +15,7 @@ from bim.outdoors import beyond
 from bim.to_tracer import element_surfaces
 from scenes.figures.plan import sensor_cells
 from scenes.figures.scale import ColourScale
+from scenes.language.catalogue import N_, gettext
 from scenes.report.daylight_figures import top_of_scale, useful_column
 from scenes.report.headline import sensor_column
 from scenes.report.names import quantity
@@ -39,6 +40,11 @@ STOREYS_ABOVE = 3  # without rooms, the roof with them
 SHOWN = 300.0  # of the surroundings at the least, from the rooms [m]
 SHOWN_SIZES = 5  # or so many times the rooms' size
 MARK = 0.3  # least size of the mark of a leak [m]
+NORTH_DOUBTS = {  # code of an issue: what the arrow then is
+    "true-north-missing": N_("This is an assumption: the file states no north."),
+    "true-north-invalid": N_("This is an assumption: the north of the file is not usable."),
+    "north-contradicts-map": N_("The file states two different directions of north."),
+}
 NORTH = 0.2  # length of the arrow by the longer side of the building
 STEPS = 32000  # of the 16-bit coordinates over the model's half size
 
@@ -67,6 +73,7 @@ class Model3D:
     storeys: tuple[str, ...]  # names, the lowest first
     left_out: int
     extra: tuple[str, ...] = ()  # kinds of what belongs to no room: "mark", "before", "north"
+    north: str = ""  # what is doubtful of the arrow
 
     def json(self) -> dict[str, Any]:
         """The parts that go into the page as JSON."""
@@ -189,6 +196,21 @@ def _model(
         names,
         left_out,
         tuple(dict.fromkeys(kind for kind, _ in extra)),
+        next((gettext(NORTH_DOUBTS[one.code]) for one in building.issues if one.code in NORTH_DOUBTS), ""),
+    )
+
+
+def surroundings_note(building: Building) -> str:
+    """A sentence where nothing stands around the building, as views and light then are those of an open field."""
+    low, high = building_box(building)[:, :2] if building.spaces else np.zeros((2, 2))
+    for element in building.elements:
+        points = element.triangles.reshape(-1, 3)[:, :2]
+        beside = len(points) and bool(((points < low - BESIDE) | (points > high + BESIDE)).any())
+        if beside and not element.ifc_class.startswith(TERRAIN):
+            return ""
+    return gettext(
+        "No surroundings are modelled: daylight, sun and view out are those of a site without buildings and trees "
+        "(--surroundings adds them)."
     )
 
 

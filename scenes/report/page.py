@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from bim.model import Building
 from mitsuba_cfs.files import json_text, write_text
+from mitsuba_cfs.notes import Note
 from scenes.figures.plan import plan_frame, window_from_above
 from scenes.head import Head
 from scenes.language.catalogue import N_, gettext, in_language, ngettext, translated
@@ -26,7 +27,7 @@ from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import tables
 from scenes.report.method import method_words
-from scenes.report.model3d import checked_model, model3d
+from scenes.report.model3d import checked_model, model3d, surroundings_note
 from scenes.report.names import glossary, option_words, stage_words
 from scenes.report.page_files import page_files
 from scenes.report.room import room_page
@@ -164,6 +165,7 @@ UNIT_AFTER_NUMBER = re.compile(r"(\d) (°C|%|lx|h|m²|m³|kWh|cd/m²)(?!\w)")
 OPTION = re.compile(r"(?<!\w)--[a-z][\w-]*")
 UNIT_EXPONENT = re.compile(r"(?<![\w.-])(k?m|cm|mm)([23])(?![\w.-])")
 EXPONENTS = {"2": "²", "3": "³"}
+FAR_SITE = re.compile(r"The site of the building \(\{building\}\) is far from the weather station")
 SCRIPTS = ("tables.js", "pointer.js", "viewer.js", "storeys.js")
 SAVING = "figures.js"  # of pages with figures to save
 
@@ -215,7 +217,7 @@ def _filled(result: RunResult, page: PageOptions) -> str:
             page=page,
             title=page.title or result.building.name or gettext("Building"),
             result=result,
-            head=head_lines(result.head, result.notes),
+            head=(*head_lines(result.head, result.notes), *filter(None, [surroundings_note(result.building)])),
             rooms=rooms,
             verdict=verdict(result, [room.cards for room in rooms]),
             model=model,
@@ -315,11 +317,14 @@ def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
             gettext("{degrees}° N", degrees=latitude) if north >= 0 else gettext("{degrees}° S", degrees=latitude),
             gettext("{degrees}° E", degrees=longitude) if east >= 0 else gettext("{degrees}° W", degrees=longitude),
         )
-        rows.append((gettext("Location"), semicolons(place)))
+        far = any(isinstance(note, Note) and FAR_SITE.match(note.template) for note in result.head.assumed)
+        parts = (*place, *([gettext("far from the weather station, whose sun is used")] if far else []))
+        rows.append((gettext("Site of the building"), semicolons(parts)))
     manifest = result.manifest
     inputs = manifest.get("inputs", {})
     main = ("building", "weather", "system")
-    rows += [(_title(name), _named(manifest, name)) for name in main if name in inputs]
+    titles = {"weather": gettext("Weather and sun")}
+    rows += [(titles.get(name) or _title(name), _named(manifest, name)) for name in main if name in inputs]
     if "system" not in inputs and manifest.get("system"):
         rows.append((gettext("Fenestration"), str(manifest["system"])))
     first, last = result.times[0], result.times[-1]

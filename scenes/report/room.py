@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ from scenes.language.catalogue import N_, gettext, ngettext, translated
 from scenes.language.numbers import percent, rounded, share
 from scenes.report import daylight_figures, glare_figures, spectral_figures, tables, thermal_figures
 from scenes.report.glare_figures import compass
-from scenes.report.headline import Card, cards, occupied
+from scenes.report.headline import Card, cards, cooled, occupied
 from scenes.report.names import quantity
 from scenes.report.tables import monthly_gains
 from scenes.report.thermal_figures import month_chart
@@ -197,7 +198,7 @@ class RoomPage(RoomSection):
     states: tuple[Chart, ...]
     loads: Chart | None
     loads_table: tables.Table | None
-    comfort_table: tables.Table
+    comfort_table: tables.Table | None  # None: cooled, where adaptive comfort does not hold
     fenestration: tuple[tables.Table, ...]
 
 
@@ -231,8 +232,8 @@ def room_page(result: RunResult, room: RoomYear, number: int) -> RoomPage:
         loads=loads_chart(room),
         loads_table=None
         if room.operation is None
-        else tables.values_table(gettext("Annual loads"), room.operation.summary),
-        comfort_table=tables.values_table(gettext("Comfort"), room.heat.comfort_summary),
+        else tables.values_table(gettext("Annual loads"), _loads(room.operation.summary)),
+        comfort_table=None if cooled(room) else tables.values_table(gettext("Comfort"), room.heat.comfort_summary),
         fenestration=tuple(
             tables.values_table(
                 str(values.get("system") or gettext("Window with shading")),
@@ -241,6 +242,12 @@ def room_page(result: RunResult, room: RoomYear, number: int) -> RoomPage:
             for values in room.heat.fenestration
         ),
     )
+
+
+def _loads(summary: Mapping[str, float]) -> dict[str, float]:
+    """The sums of the year; without lamps there is no energy of the light."""
+    dark = () if summary.get("lighting_kwh") else ("lighting_kwh", "leni_kwh_m2")
+    return {key: value for key, value in summary.items() if key not in dark}
 
 
 def facts(space: Space, template: str = "") -> tuple[tuple[str, str], ...]:

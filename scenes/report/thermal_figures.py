@@ -12,7 +12,7 @@ from scenes.figures.chart import Chart, ChartMark, Readout, box, line
 from scenes.figures.scale import ColourScale, Tick, axis_ticks, round_limits
 from scenes.language.catalogue import gettext
 from scenes.language.numbers import day_and_month, month_name, percent, rounded, short_month
-from scenes.report.headline import WARM_C, applicable, comfort_columns, heated, occupied
+from scenes.report.headline import WARM_C, applicable, comfort_columns, cooled, heated, occupied
 from scenes.report.names import quantity
 from scenes.report.tables import step_hours
 from scenes.results import RoomYear, RunResult
@@ -38,10 +38,10 @@ def temperature_carpet(result: RunResult, room: RoomYear) -> Chart:
 
 
 def comfort_carpet(result: RunResult, room: RoomYear) -> Chart | None:
-    """Adaptive comfort of every occupied hour in classes."""
+    """Adaptive comfort of every occupied hour in classes; None for a cooled room, where it does not hold."""
     comfort = room.heat.comfort
     columns = comfort_columns(comfort)
-    if not columns or "comfort_c" not in comfort:
+    if not columns or "comfort_c" not in comfort or cooled(room):
         return None
     operative = room.heat.temperatures["operative_c"].to_numpy()
     neutral = comfort["comfort_c"].to_numpy()
@@ -136,7 +136,7 @@ def week(room: RoomYear, start: pd.Timestamp, title: str) -> Chart:
     part = room.heat.temperatures[inside]
     curves = {name: part[name].to_numpy() for name in CURVES if name in part}
     comfort = room.heat.comfort
-    if "comfort_c" in comfort:
+    if "comfort_c" in comfort and not cooled(room):
         covered = applicable(comfort)[inside]
         if covered.any():
             curves["comfort_c"] = comfort.loc[inside, "comfort_c"].where(covered).to_numpy()

@@ -14,7 +14,7 @@ from mitsuba_cfs.glare.indices import DGP_IN_DARK, DGP_PER_LUX
 from mitsuba_cfs.notes import Note
 from scenes.language.catalogue import gettext, ngettext
 from scenes.language.numbers import colon, month_name, percent, rounded, semicolons, share, significant, spoken
-from scenes.report.answer import judged, rooms_answer
+from scenes.report.answer import judged, limits_counted, rooms_answer
 from scenes.report.glare_figures import sun_words
 from scenes.report.headline import FAIR, GOOD, POOR, WARM_C, Card, dgp_error, heated, occupied
 from scenes.report.method import METHODS
@@ -150,7 +150,8 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
         *([(gettext("How sure"), bands)] if (bands := bands_sentence(result)) else []),
     )
     named = [(r.space.label, r, card) for r, card in zip(result.spaces, cards, strict=True)]
-    answer = rooms_answer([judged(name, figures) for name, _, figures in named])
+    cases = [judged(name, figures) for name, _, figures in named]
+    answer = " ".join(filter(None, (rooms_answer(cases), limits_counted(cases))))
     answers = (("", answer),) if answer else ()
     return Verdict(question, answers, sentences, limits(named, gettext("Room")))
 
@@ -202,31 +203,29 @@ def _cause(picture: LuminancePicture) -> str:
     if by_sources > by_light:
         parts = _parts(by_sources, by_light)
         if not count:
-            return gettext(
-                "Bright areas in view contribute more than the {lux} lx at the eye ({parts}).", lux=lux, parts=parts
-            )
+            return gettext("Causes: bright areas in view ({one} %), {lux} lx at the eye ({other} %).", lux=lux, **parts)
         return ngettext(
-            "{count} bright source in view contributes more than the {lux} lx at the eye ({parts}).",
-            "{count} bright sources in view contribute more than the {lux} lx at the eye ({parts}).",
+            "Causes: {count} bright source in view ({one} %), {lux} lx at the eye ({other} %).",
+            "Causes: {count} bright sources in view ({one} %), {lux} lx at the eye ({other} %).",
             count,
             lux=lux,
-            parts=parts,
+            **parts,
         )
     if count == 0 or by_sources <= 0:
         return gettext("The {lux} lx at the eye are the only cause.", lux=lux)
     return ngettext(
-        "The {lux} lx at the eye contribute more than {count} bright source in view ({parts}).",
-        "The {lux} lx at the eye contribute more than {count} bright sources in view ({parts}).",
+        "Causes: {lux} lx at the eye ({one} %), {count} bright source in view ({other} %).",
+        "Causes: {lux} lx at the eye ({one} %), {count} bright sources in view ({other} %).",
         count,
         lux=lux,
-        parts=_parts(by_light, by_sources),
+        **_parts(by_light, by_sources),
     )
 
 
-def _parts(one: float, other: float) -> str:
-    """Two shares of what DGP has beyond its value without light."""
+def _parts(one: float, other: float) -> dict[str, int]:
+    """Shares [%] of two terms in what DGP has beyond its value without light."""
     part = round(100 * one / (one + other))
-    return gettext("{one} to {other} %", one=part, other=100 - part)
+    return {"one": part, "other": 100 - part}
 
 
 def _overheating(result: RunResult) -> str:

@@ -25,7 +25,7 @@ from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import page as run_page
 from scenes.report import tables
-from scenes.report.answer import Judged, judged, met_cell, rooms_answer, summary_answer, systems_answer
+from scenes.report.answer import Judged, judged, limits_counted, met_cell, rooms_answer, summary_answer, systems_answer
 from scenes.report.headline import WARM_C, Card, cards, protection_card
 from scenes.report.method import METHODS
 from scenes.report.model3d import ColourLayer, Model3D, colour_bytes, model3d
@@ -178,7 +178,16 @@ def _limited(study: StudyResult) -> list[Limited]:
 
 
 def _answers(study: StudyResult, limited: Sequence[Limited]) -> tuple[tuple[str, str], ...]:
-    """Which system meets the limits: for each room, climate, orientation and method."""
+    """Which system meets the limits: for each room, climate, orientation and method; then which limits these are."""
+    answers = _answers_by_place(study, limited)
+    counted = limits_counted([judged(case.system, own) for case, _, own, _ in limited])
+    if not answers or not counted:
+        return answers
+    *before, (name, text) = answers
+    return (*before, (name, f"{text} {counted}"))
+
+
+def _answers_by_place(study: StudyResult, limited: Sequence[Limited]) -> tuple[tuple[str, str], ...]:
     groups: dict[str, list[tuple[Judged, float | None]]] = {}
     for case, _, own, result in limited:
         figures = result.figures

@@ -63,6 +63,16 @@ def test_a_command_reports_its_progress_and_leaves_its_results(project, jobs) ->
     assert log.read_text("utf-8").startswith("$ cfs check inputs/office.ifc")
 
 
+@pytest.mark.parametrize("form", ["gltf", "radiance"])
+def test_the_first_export_of_a_project_makes_its_folder(project, jobs, form) -> None:
+    export = actions.export(project, form)
+    jobs.add([export])
+    until(lambda: not jobs.busy)
+    (job,) = jobs.facts()
+    assert job["state"] == "done", job["lines"]
+    assert (project.folder / export.out).exists()
+
+
 def test_stop_and_resume(project, jobs, monkeypatch) -> None:
     blind = actions.library("double clear", "venetian 25 mm inside, 45 deg")  # traced for seconds
     take = jobs._take

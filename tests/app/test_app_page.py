@@ -126,6 +126,30 @@ def test_a_system_of_the_library_is_a_variant_with_its_sheet(browser, served) ->
     assert told.startswith("Fabric by the model of") and ". Moves between the states of controlled " in told
 
 
+def test_a_fixed_shade_does_not_move(browser, served) -> None:
+    go(browser, "systems")
+    moving = "document.getElementById('moving').disabled"
+    for shade, fixed in (
+        ("perforated sheet, 30 %", True),
+        ("fixed louvre 150 mm, 30 deg", True),
+        ("screen 5 %, grey", False),
+    ):
+        select(browser, "shade", shade)
+        assert browser.value(moving) is fixed
+    wanted = {"glazing": "double low-e", "shade": "perforated sheet, 30 %", "moving": True}
+    status, answer = served.page("POST", "/api/library", wanted)
+    assert status == 422 and "fixed" in answer["error"]
+
+
+def test_the_elapsed_time_goes_on_between_news(browser) -> None:
+    browser.value(
+        "document.body.insertAdjacentHTML('beforeend', `<i id=clock data-since=${Date.now() / 1000 - 57}></i>`); 0"
+    )
+    browser.until("document.getElementById('clock').textContent === '59 s'")
+    browser.until("document.getElementById('clock').textContent === '1 min 1 s'")
+    browser.value("document.getElementById('clock').remove()")
+
+
 def test_the_commands_are_shown_before_they_run(browser, served) -> None:
     go(browser, "compute")
     browser.click("#compute input[data-key='rule en17037']")
@@ -180,7 +204,12 @@ def test_nothing_is_wider_than_the_window(browser, width) -> None:
     browser.value("location.hash = '#building'")
     browser.until("!document.getElementById('building').hidden")
     rows = "[...document.querySelectorAll('#room-rows tr')].map((row) => row.getBoundingClientRect().height)"
-    assert max(browser.value(rows)) < 70, "a row of rooms is as tall as a column of words"
+    assert max(browser.value(rows)) < (70 if width > 620 else 150), "a row of rooms is as tall as a column of words"
+    cells = "[...document.querySelectorAll('#{} td, #{} button')].map((e) => e.getBoundingClientRect().right)"
+    for step, table in (("building", "room-rows"), ("files", "file-rows")):
+        browser.value(f"location.hash = '#{step}'")
+        browser.until(f"!document.getElementById('{step}').hidden")
+        assert 0 < max(browser.value(cells.format(table, table))) <= width, table
 
 
 @pytest.mark.skipif(not AXE.is_file(), reason="no axe-core")
@@ -204,6 +233,80 @@ def test_the_page_is_german_where_it_is_asked_to_be(tmp_path) -> None:
         assert page.value("document.documentElement.lang") == "de"
         text = page.value("document.body.innerText")
         assert "Dateien" in text and "Choose" not in text and "Next" not in text
+
+
+def test_doubts_have_reasons_and_rooms_are_joined_by_click(tmp_path) -> None:
+    """A far weather station and an unknown north are said where they are chosen; open rooms become one, then two."""
+    with serving(tmp_path / "project") as served, Page(tmp_path) as page:
+        for file in (OFFICE, WEATHER):
+            served.upload(Path(file))
+        served.idle()
+        path = served.project.folder / "results" / "check.json"
+        record = json.loads(path.read_text("utf-8"))
+        rooms = record["rooms"]
+        names, guids = [room["label"] for room in rooms[:2]], [room["guid"] for room in rooms[:2]]
+        record["site"] = {"latitude_deg": 51.5, "longitude_deg": 0.0}
+        record["issues"] = [
+            {
+                "code": "true-north-missing",
+                "severity": "assumption",
+                "what": "No north",
+                "effect": "",
+                "fix": "",
+                "count": 1,
+                "glass_m2": 0,
+                "where": "",
+            }
+        ]
+        record["open_rooms"] = [{"rooms": names, "guids": guids, "area_m2": 14.9, "join": " + ".join(guids)}]
+        trifle = {
+            "level": "minor",
+            "code": "glass-lost",
+            "severity": "loss",
+            "glass_m2": 0.01,
+            "what": "A pane",
+            "effect": "is lost",
+        }
+        rooms[0] |= {"doubt": "minor", "doubts": [trifle], "volume_m3": 47.4, "drawn_volume_m3": 76.5}
+        path.write_text(json.dumps(record), "utf-8")
+        page.open(served.address)
+        assert "km from the building's site" in page.value("document.getElementById('needed').innerText")
+        go(page, "building")
+        place = page.value("document.getElementById('place').innerText")
+        assert "the arrow is an assumption" in place and "km from the building's site" in place
+        assert "left out" not in page.value("document.querySelector('#room-rows tr').innerText")
+        page.click("#room-rows tr:nth-child(1) button")
+        page.until("document.querySelector('#room h3') !== null")
+        panel = page.value("document.getElementById('room').innerText")
+        assert (
+            "47.4 m³ (as drawn: 76.5 m³)" in panel
+            and "A pane: is lost (0.01 m² of glass)" in panel
+            and "14.9 m²" in panel
+        )
+        page.click("#room [data-key^='join ']")
+        page.until("!document.getElementById('joined-box').hidden")
+        assert served.project.study()["room"][0]["join"] == [" + ".join(guids)]
+        served.idle()
+        last = served.project.journal()[-1]
+        assert last["kind"] == "check" and " + ".join(guids) in last["command"]
+        page.until("!document.querySelector('#joined button').disabled")
+        page.click("#joined button")
+        page.until("document.getElementById('joined-box').hidden")
+        assert "join" not in served.project.study()["room"][0]
+
+
+def test_a_command_that_was_resumed_is_not_resumed_again(tmp_path) -> None:
+    with serving(tmp_path / "project") as served, Page(tmp_path) as page:
+        served.jobs.add([actions.Action("export", "bad", ("export", "none.ifc", "--gltf", "none.glb"), "results/none")])
+        served.idle()
+        page.open(served.address)
+        go(page, "compute")
+        page.until("document.querySelectorAll('#jobs [data-key^=\"again \"]').length === 1")
+        page.click("#jobs [data-key^='again ']")
+        page.until("document.querySelectorAll('#jobs > li').length === 2")
+        served.idle()
+        page.until("document.querySelector('#jobs [data-key=\"again 2\"]') !== null")
+        assert page.value("document.querySelector('#jobs [data-key=\"again 1\"]')") is None
 
 
 def test_windows_without_glazing_data_are_named_before_a_command_refuses_them(tmp_path) -> None:

@@ -20,6 +20,7 @@ from scenes.comply.uses import read_uses
 from scenes.demo import OFFICE, VENETIAN_BLIND, WEATHER
 from scenes.fenestration.generic_glazing import GENERIC_GLAZINGS
 from scenes.fenestration.library import library, sheets, write_library_system
+from scenes.page_options import DossierSection, RunSection, read_page
 from scenes.result_folder import ResultFolder
 from scenes.room.operation import read_operation
 from scenes.study.files import check_files
@@ -227,6 +228,8 @@ def test_uses_and_corrections_are_files_of_the_command_line(project) -> None:
         {"title": 3},
         {"nothing": 1},
         {"spaces": "all"},
+        {"join": ["A"]},
+        {"join": ["--csv + B"]},
         {"loads": {"heating_c": "x"}},
         {"systems": [{"name": "x", "bsdf": "../../etc/passwd"}]},
         {"systems": [3]},
@@ -281,6 +284,30 @@ def test_every_command_of_the_page_is_one_of_the_command_line(project, monkeypat
     operation = moving.command[moving.command.index("--operation") + 1]
     assert project.states(operation) == ["inputs/glazing.xml", "inputs/venetian_blind.xml"]
     assert "--cfs" not in moving.command and "--closed" not in moving.command
+
+
+def test_rooms_are_joined_and_separated(project, monkeypatch) -> None:
+    """The study, the check and every computation read the rooms as one, until they are separated."""
+    monkeypatch.chdir(project.folder)
+    project.change({"join": ["A + B"]})
+    assert project.study()["room"][0]["join"] == ["A + B"]
+    found = [actions.check(project), *actions.computations(project, {"report": True, "standards": ["en17037"]})]
+    for one in (*found, actions.export(project, "gltf")):
+        assert one.command[one.command.index("--join") + 1] == "A + B"
+        _accepted(one.command)
+    project.change({"join": []})
+    assert "join" not in project.study()["room"][0] and "--join" not in actions.check(project).command
+
+
+def test_the_title_is_that_of_report_and_dossier(project, monkeypatch) -> None:
+    monkeypatch.chdir(project.folder)
+    (project.folder / "page.toml").write_text('author = "A. Engineer"\n')
+    project.change({"title": "Villa"})
+    found = actions.computations(project, {"report": True, "standards": ["en17037"], "language": "de"})
+    for one, sections in zip(found, (RunSection, DossierSection), strict=True):
+        page = read_page(Path(one.command[one.command.index("--page") + 1]), sections, "de")
+        assert (page.title, page.author, page.language) == ("Villa", "A. Engineer", "de")
+        _accepted(one.command)
 
 
 def test_what_is_missing_is_named(tmp_path) -> None:

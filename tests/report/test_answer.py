@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from scenes.language.catalogue import in_language
-from scenes.report.answer import judged, met_cell, rooms_answer, summary_answer, systems_answer
+from scenes.report.answer import judged, limits_counted, met_cell, rooms_answer, summary_answer, systems_answer
 from scenes.report.headline import GLARE_OF_PICTURES, GLARE_OF_YEAR, GOOD, POOR, Card, cards
 from scenes.report.page import report_html
 from scenes.report.verdict import verdict
@@ -55,12 +55,28 @@ def test_rooms_that_fail_are_named_or_counted() -> None:
     assert rooms_answer([bad, bad]).startswith("No room meets every limit. R2 fails")
 
 
-def test_a_picture_counts_only_without_the_glare_of_the_year() -> None:
-    """A picture at sunrise, before anybody works, is no failure where the year's glare is rated."""
+def test_a_picture_counts_in_no_answer() -> None:
+    """No standard limits the glare of one picture, whether the year's glare is rated or not."""
     picture = Card("A", "0.70", "DGP", "", "intolerable", POOR, code=GLARE_OF_PICTURES)
     rated = replace(limited("B", "High"), code=GLARE_OF_YEAR)
     assert judged("R", [picture, rated]).failed == ()
-    assert judged("R", [picture]).failed == (picture,)
+    assert judged("R", [picture]).cards == ()
+
+
+def test_limits_are_named_with_their_standards() -> None:
+    ase, rated = replace(ASE, standard="LM-83"), replace(GLARE, standard="EN 17037")
+    case = judged("R", [SDA, ase, rated])
+    assert "fails annual sunlight exposure (LM-83: 30 %) and protection from glare (EN 17037: none)" in rooms_answer(
+        [case]
+    )
+    assert "R fails annual sunlight exposure (LM-83) and" in rooms_answer([case, judged("S", [SDA])])
+    assert limits_counted([case, case]) == (
+        "Limits counted: LM-83: annual sunlight exposure; EN 17037: protection from glare."
+    )
+    assert limits_counted([judged("R", [FREE])]) == ""
+    run = run_result(picture_size=32)
+    ((_, text),) = verdict(run, [cards(run, room) for room in run.spaces]).answers
+    assert "Limits counted: LM-83: spatial daylight autonomy, annual sunlight exposure; EN 17037:" in text
 
 
 def test_many_rooms_count_the_systems_that_meet_everything() -> None:

@@ -40,9 +40,9 @@ def test_glare_names_its_hour_its_sun_and_its_cause(result) -> None:
     # 5.87e-5 of 5,000 lx are 0.29; the sources add 0.05
     text = said(_with_glare(result, dgp=0.50, ev=5000.0, dgp_standard_error=0.0012), "Glare")
     assert "The picture shows intolerable glare: DGP 0.50 ± 0.001" in text and "solar altitude" in text
-    assert "5\u202f000 lx at the eye contribute more than 2 bright sources in view (86 to 14 %)" in text
+    assert "Causes: 5\u202f000 lx at the eye (86 %), 2 bright sources in view (14 %)." in text
     text = said(_with_glare(result, dgp=0.42, ev=1000.0, sources=3), "Glare")
-    assert "disturbing" in text and "3 bright sources in view contribute more" in text
+    assert "disturbing" in text and "Causes: 3 bright sources in view (" in text
     text = said(_with_glare(result, dgp=0.30), "Glare")
     assert text.startswith("Glare is imperceptible in all pictures; the highest DGP is 0.30")
 

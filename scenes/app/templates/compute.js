@@ -1,6 +1,6 @@
 // Step 4: what to compute, its commands, and how far they are.
 import { byId, commandLine, fill, h, post, spoken, tried, unfilledText } from "./dom.js";
-import { jobName, lastLine, progressText, share } from "./jobs.js";
+import { jobName, lastLine, progressBar, progressText } from "./jobs.js";
 
 const { gettext, ngettext } = cfs;
 let page = null, asked = "", planned = [];
@@ -52,16 +52,17 @@ function drawJobs() {
   const open = new Set([...byId("jobs").querySelectorAll("details[open]")].map((one) => one.dataset.key));
   fill(byId("jobs"), jobs.map((job) => {
     const time = job.started ? spoken((job.ended || Date.now() / 1000) - job.started) : "";
-    const bar = job.state === "running" ? h("progress", { max: "1", "aria-label": jobName(job), ...(job.progress.stage ? { value: share(job) } : {}) }) : null;
+    const bar = job.state === "running" ? progressBar(job) : null;
+    const again = page.jobs.some((one) => one.number > job.number && one.command === job.command);
     const act = job.state === "waiting" || job.state === "running"
       ? h("button", { type: "button", "data-key": `stop ${job.number}`, onclick: () => tried(async () => { await post("stop", { number: job.number }); await page.news(); }) }, gettext("Stop"))
-      : job.state === "stopped" || job.state === "failed"
+      : (job.state === "stopped" || job.state === "failed") && !again
         ? h("button", { type: "button", "data-key": `again ${job.number}`, onclick: () => tried(async () => { await post("again", { number: job.number }); await page.news(); }) }, gettext("Resume"))
         : null;
-    const key = `job ${job.number}`;
+    const key = `job ${job.number}`, since = job.state === "running" ? { "data-since": job.started } : {};
     const output = h("details", { "data-key": key, open: open.has(key) }, h("summary", {}, gettext("Command and output")), commandLine(job.command), h("pre", { tabindex: "0" }, job.lines.join("\n")));
     return h("li", { class: job.state },
-      h("div", { class: "job" }, h("b", {}, jobName(job)), h("span", { class: `chip ${job.state}` }, names[job.state]), h("span", { class: "soft" }, time), act),
+      h("div", { class: "job" }, h("b", {}, jobName(job)), h("span", { class: `chip ${job.state}` }, names[job.state]), h("span", { class: "soft", ...since }, time), again ? h("span", { class: "soft" }, gettext("resumed since")) : null, act),
       bar, job.state === "running" ? h("p", { class: "soft" }, progressText(job) || gettext("starting")) : null,
       job.state === "failed" ? h("p", { class: "fault" }, lastLine(job)) : null, output);
   }));

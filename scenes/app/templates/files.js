@@ -39,13 +39,13 @@ const demo = () => tried(async () => {
 
 function needed() {
   const { state } = page, mark = (done) => h("i", { class: `mark ${done ? "done" : "todo"}`, "aria-hidden": "true" });
-  const row = (done, name, text) => h("li", {}, mark(done), h("div", {}, h("b", {}, name), h("span", {}, text)));
+  const row = (done, name, text, doubt = "") => h("li", {}, mark(done), h("div", {}, h("b", {}, name), h("span", {}, text), doubt ? h("span", { class: "doubt" }, doubt) : null));
   return h("ul", { class: "needed" },
     row(state.building.length, gettext("Building"), state.building.length
       ? state.building.map((path) => path.split("/").at(-1)).join(" + ")
       : gettext("IFC (one file or several of one building), HBJSON or gbXML")),
     row(state.weather.length, gettext("Weather"), state.weather.length
-      ? state.weather[0].split("/").at(-1) : gettext("an EPW file of the site, with every hour of a year")),
+      ? state.weather[0].split("/").at(-1) : gettext("an EPW file of the site, with every hour of a year"), page.farText()),
     row(state.systems.length, gettext("Systems of the windows"), state.systems.length
       ? state.systems.map((one) => one.name).join(", ")
       : gettext("BSDF files (XML), or choose from the library in step 3; without, what the building's file states")));

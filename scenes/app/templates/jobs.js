@@ -1,5 +1,5 @@
 // Commands in words.
-import { spoken } from "./dom.js";
+import { h, spoken } from "./dom.js";
 
 const { gettext } = cfs;
 
@@ -17,14 +17,21 @@ export function lastLine(job) {
 }
 
 export function progressText(job) {
-  const { stage = "", item, number, total, left_s: left } = job.progress;
-  const parts = [stage];
+  const { stage = "", fraction = 0, item, number, total, left_s: left } = job.progress;
+  const parts = [stage && fraction > 0 && fraction < 1 ? `${stage} ${Math.round(100 * fraction)} %` : stage];
   if (item) parts.unshift(`${item} ${number} / ${total}`);
   if (left) parts.push(gettext("about {time} left", { time: spoken(left) }));
   return parts.filter(Boolean).join(", ");
 }
 
-export function share(job) {
-  const { fraction = 0, number, total } = job.progress;
-  return total > 1 ? (number - 1 + Math.min(fraction, 1)) / total : fraction;
+// How much of the rooms, or of the cases, is done; undefined where only a step of the command is known
+function share(job) {
+  const { number, total } = job.progress;
+  return total > 1 ? (number - 1) / total : undefined;
+}
+
+// A bar of the whole command; it has no length while only a step is known
+export function progressBar(job) {
+  const done = share(job);
+  return h("progress", { max: "1", "aria-label": jobName(job), ...(done === undefined ? {} : { value: done }) });
 }

@@ -1,9 +1,9 @@
 // The page: what is known of the project, the steps, and news of the commands.
-import { byId, fill, get, h, notice, post, tried } from "./dom.js";
+import { byId, fill, get, h, notice, post, spoken, tried } from "./dom.js";
 import { showBuilding } from "./building.js";
 import { showCompute } from "./compute.js";
 import { showFiles } from "./files.js";
-import { jobName, lastLine, progressText, share } from "./jobs.js";
+import { jobName, lastLine, progressBar, progressText } from "./jobs.js";
 import { showResults } from "./results.js";
 import { showSystems } from "./systems.js";
 
@@ -55,6 +55,17 @@ const page = {
   async loadCheck() { this.check = await get("check"); },
   link(path) { return this.files + path.split("/").map(encodeURIComponent).join("/"); },
   get running() { return this.jobs.find((job) => job.state === "running"); },
+  // Whether the building is being read, or will be
+  get reading() { return this.jobs.some((job) => job.kind === "check" && ["waiting", "running"].includes(job.state)); },
+  // A sentence where the weather station is far from the building's site
+  farText() {
+    const { station } = this.state, site = this.check?.site;
+    if (!station || !this.state.building.length || !site || site.latitude_deg === null || site.longitude_deg === null) return "";
+    const east = (((site.longitude_deg - station.longitude_deg + 180) % 360) + 360) % 360 - 180, north = site.latitude_deg - station.latitude_deg;
+    if (Math.max(Math.abs(north), Math.abs(east)) <= station.far_deg) return "";
+    const km = 111.2 * Math.hypot(north, east * Math.cos(site.latitude_deg * Math.PI / 180));
+    return gettext("The weather station {station} is about {distance} km from the building's site; sun and weather are those of the station.", { station: station.name, distance: String(Math.round(km / 10) * 10) });
+  },
   get waiting() { return this.jobs.filter((job) => job.state === "waiting"); },
   // The rooms that are computed, of those that the check found
   get chosen() {
@@ -89,7 +100,7 @@ const page = {
 function mark(name) {
   const { state, check } = page;
   if (name === "files") return state.building.length && state.weather.length ? "done" : "todo";
-  if (name === "building") return check && state.building.length ? (check.rooms.some((room) => room.doubt) ? "doubt" : "done") : "todo";
+  if (name === "building") return check && state.building.length ? (check.rooms.some((room) => room.doubt === "serious") ? "doubt" : "done") : "todo";
   if (name === "systems") return state.systems.length ? "done" : page.unfilled() ? "doubt" : "todo";
   const results = state.results.filter((one) => one.pages.report || one.pages.dossier);
   return results.length ? "done" : "todo";
@@ -102,10 +113,9 @@ function showStatus() {
   const job = page.running;
   byId("status").hidden = !job;
   if (!job) return;
-  const bar = h("progress", { max: "1", "aria-label": jobName(job) });
-  if (job.progress.stage) bar.value = share(job);
+  const bar = progressBar(job);
   fill(byId("status"),
-    h("div", { class: "doing" }, h("b", {}, jobName(job)), h("span", {}, progressText(job) || gettext("starting"))),
+    h("div", { class: "doing" }, h("b", {}, jobName(job), ", ", h("span", { class: "time", "data-since": job.started }, spoken(Date.now() / 1000 - job.started))), h("span", {}, progressText(job) || gettext("starting"))),
     bar,
     page.waiting.length ? h("span", { class: "soft" }, cfs.ngettext("{count} command waits", "{count} commands wait", page.waiting.length)) : null,
     h("button", { type: "button", "data-key": "stop", onclick: () => stop(job) }, gettext("Stop")));
@@ -135,6 +145,10 @@ function go() {
   document.querySelector("nav [aria-current]").scrollIntoView({ block: "nearest", inline: "nearest" }); // on a phone
   scrollTo({ top: 0, behavior: "instant" });
 }
+
+setInterval(() => {
+  for (const element of document.querySelectorAll("[data-since]")) element.textContent = spoken(Date.now() / 1000 - element.dataset.since);
+}, 1000);
 
 addEventListener("hashchange", go);
 // Each part alone: a damaged file of results leaves the rest of the page

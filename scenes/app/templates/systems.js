@@ -14,9 +14,9 @@ const sentence = (text) => `${text.slice(0, 1).toUpperCase()}${text.slice(1)}.`;
 const save = (systems) => page.change({ systems });
 
 function named(system) {
-  const input = h("input", {
-    type: "text", maxlength: "80", value: system.name, "data-key": `name ${system.name}`, "aria-label": gettext("Name of the variant"),
-    onchange: (event) => save(page.state.systems.map((one) => (one === system ? { ...one, name: event.target.value } : one))),
+  const input = h("textarea", { // long names are read whole
+    rows: "2", maxlength: "80", value: system.name, "data-key": `name ${system.name}`, "aria-label": gettext("Name of the variant"),
+    onchange: (event) => save(page.state.systems.map((one) => (one === system ? { ...one, name: event.target.value.replace(/\s+/g, " ").trim() } : one))),
   });
   return input;
 }
@@ -44,8 +44,9 @@ function drawSheet() {
   const glass = library.glazings.find((one) => one.name === glazing), cover = library.shades.find((one) => one.name === shade);
   fill(byId("library-sheet"), found ? sheetList(found) : null,
     h("p", { class: "soft" }, [cover, glass].filter(Boolean).map((one) => one.source).join("; "), "."));
-  byId("moving").disabled = !shade;
-  byId("moving").closest("label").classList.toggle("off", !shade);
+  byId("moving").disabled = !shade || cover.fixed;
+  if (byId("moving").disabled) byId("moving").checked = false;
+  byId("moving").closest("label").classList.toggle("off", byId("moving").disabled);
 }
 
 function drawLibrary() {
@@ -72,12 +73,21 @@ byId("add-system").addEventListener("click", () => tried(async () => {
   await post("library", { glazing, shade, moving: Boolean(shade) && byId("moving").checked });
   await page.refresh(); // one whose files are there already is a variant at once
   await page.news();
-  byId("making").hidden = false;
+  drawMaking();
 }));
+
+// Systems of the library that are being made, or wait behind other commands
+function drawMaking() {
+  const made = page.jobs.filter((job) => job.kind === "systems" && ["waiting", "running"].includes(job.state));
+  byId("making").hidden = !made.length;
+  byId("making").textContent = made.some((job) => job.state === "running")
+    ? gettext("The system is being made; a traced blind takes about a minute.")
+    : gettext("The system is queued: it is made once the commands before it have ended.");
+}
 
 export function showSystems(one, quiet) {
   page = one;
-  byId("making").hidden = !page.jobs.some((job) => job.kind === "systems" && (job.state === "waiting" || job.state === "running"));
+  drawMaking();
   if (quiet) return;
   drawChosen();
   drawLibrary();
