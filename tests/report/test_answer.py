@@ -76,7 +76,7 @@ def test_limits_are_named_with_their_standards() -> None:
     assert limits_counted([judged("R", [FREE])]) == ""
     run = run_result(picture_size=32)
     ((_, text),) = verdict(run, [cards(run, room) for room in run.spaces]).answers
-    assert "Limits counted: LM-83: spatial daylight autonomy, annual sunlight exposure; EN 17037:" in text
+    assert "Limits counted: LM-83: spatial daylight autonomy and annual sunlight exposure; EN 17037:" in text
 
 
 def test_many_rooms_count_the_systems_that_meet_everything() -> None:

@@ -16,6 +16,7 @@ from PIL import Image
 from bim.account import Account, StoreyAccount
 from bim.report.issue import Effect, Issue, issue_text
 from scenes.report.glare_figures import gallery
+from scenes.report.headline import cooled
 from scenes.report.names import option_words
 from scenes.report.page import options_table, remaining, report_html, tied, write_report
 from scenes.results import GlareResults
@@ -83,7 +84,9 @@ def test_key_numbers_are_those_of_the_result(result, page) -> None:
         assert cards["Peak temperature"] == f"{operative.max():.1f}"
         warm = int(((operative > 26) & occupied).sum())
         assert cards["Overheating hours"].replace("\u202f", "") == f"{warm}"
-        assert cards["Adaptive comfort"] == f"{room.heat.comfort_summary['within_80']:.0f}"
+        comfort = None if cooled(room) else f"{room.heat.comfort_summary['within_80']:.0f}"
+        assert cards.get("Adaptive comfort") == comfort  # it does not hold for a cooled room
+    assert [cooled(room) for room in result.spaces] == [False, True]
 
 
 def test_hashes_versions_seed_issues_and_notes_are_shown(result, page) -> None:
