@@ -1,6 +1,7 @@
 """The names of `import scenes`, and the modules that they come from."""
 
 from .design.design import DesignResult as DesignResult, run_design as run_design
+from .design.each import run_each as run_each
 from .design.design_file import Design as Design, read_design as read_design
 from .fit.fit import FitResult as FitResult, run_fit as run_fit
 from .fit.fit_file import Fit as Fit, read_fit as read_fit

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -44,20 +46,33 @@ def command(design: Path, *, out: Path, processes: int, scheduler: str | None, p
     page_options = read_page(page, DesignSection, chosen_language())
     store = _checked((design, *parsed.files, *page_options.inputs), parsed, out, scheduler)
     from scenes.commands.progress_bar import ProgressBar, compiled_beside
-    from scenes.design.design import run_design, write_design
+    from scenes.design.design import FRONT, run_design, write_design
+    from scenes.design.each import run_each, write_each
+    from scenes.design.each_page import write_each_report
     from scenes.design.page import write_design_report, write_front_report
+    from scenes.result_folder import REPORT
 
     with ProgressBar() as progress, compiled_beside():
-        result = run_design(
-            parsed, store, processes=processes, scheduler=scheduler, progress=progress, on_candidate=_print_candidate
-        )
-    write_design(
-        result,
-        store,
-        lambda path: write_design_report(result, path, page_options),
-        lambda path: write_front_report(result, path, page_options),
-    )
-    _print_outcome(result, out)
+        options: dict[str, Any] = {"processes": processes, "scheduler": scheduler, "progress": progress}
+        options["on_candidate"] = _print_candidate
+        if parsed.search.each is None:
+            results = {"": run_design(parsed, store, **options)}
+        else:
+            results = run_each(parsed, store, on_part=click.echo, **options)
+
+    def pages(result: DesignResult) -> dict[str, Callable[[Path], object]]:
+        return {
+            REPORT: lambda path: write_design_report(result, path, page_options),
+            FRONT: lambda path: write_front_report(result, path, page_options),
+        }
+
+    if parsed.search.each is None:
+        (result,) = results.values()
+        write_design(result, store, *pages(result).values())
+    else:
+        report = partial(write_each_report, parsed, results, page=page_options)
+        write_each(parsed, results, store, report, pages)
+    _print_outcome(parsed, results, out)
 
 
 def _checked(files: tuple[Path, ...], parsed: Design, out: Path, scheduler: str | None) -> Store:
@@ -87,14 +102,26 @@ def _print_candidate(stage: str, one: Assessment, cases: int) -> None:
     click.echo(f"{label}: {values}{failed}")
 
 
-def _print_outcome(result: DesignResult, out: Path) -> None:
+def _print_outcome(design: Design, results: Mapping[str, DesignResult], out: Path) -> None:
     """The answer, the numbers of candidates and the pages."""
+    from scenes.design.each_page import answers
     from scenes.design.page import answer
 
-    for sentence in answer(result):
+    every = list(results.values())
+    for sentence in answer(every[0]) if design.search.each is None else answers(results):
         click.echo(sentence)
+    searched, full, cases, reused, seconds = (
+        sum(map(count, every))
+        for count in (
+            lambda one: len(one.searched),
+            lambda one: len(one.ranked),
+            lambda one: one.cases,
+            lambda one: one.reused,
+            lambda one: one.seconds,
+        )
+    )
     click.echo(
-        f"{len(result.searched)} candidates, {len(result.ranked)} in full; {result.cases} cases, {result.reused} from "
-        f"an earlier run, {result.seconds:.0f} s; table: {out / 'results.parquet'}"
+        f"{searched} candidates, {full} in full; {cases} cases, {reused} from an earlier run, {seconds:.0f} s; "
+        f"table: {out / 'results.parquet'}"
     )
     click.echo(f"report: {out / 'report.html'}")

@@ -180,9 +180,11 @@ def run_design(
         search: in place of the design's method, see `scenes.design.search`.
         on_candidate: called with the stage, each candidate that is ready, and how many cases are.
 
-    Raises: `DataError` where no candidate can be computed.
+    Raises: `DataError` where no candidate can be computed, `ValueError` for a design with `each`.
     """
     start = time.monotonic()
+    if design.search.each is not None:
+        raise ValueError("search.each: `run_each` gives one answer for each")
     if not isinstance(store, Store):
         store = Store(Path(store), inputs=design.files, command=COMMAND)
     every = Evaluations(
@@ -311,11 +313,11 @@ def write_design(
     """
     more = {} if front is None else {FRONT: front}
     cases = pd.DataFrame(result.study.rows())
-    more["front.csv"] = lambda path: cases.to_csv(path, index=False, float_format="%.6g")
+    more[FRONT_TABLE] = lambda path: cases.to_csv(path, index=False, float_format="%.6g")
     store.write(result.rows(), design_manifest(result), report, more=more)
 
 
-FRONT = "front.html"
+FRONT, FRONT_TABLE = "front.html", "front.csv"
 
 
 def _axis(variable: VariableTable) -> Axis:

@@ -23,6 +23,7 @@ else:
     MeasureName = Literal[tuple(MEASURES)]
 MOST_VALUES = 1000  # of a variable in steps
 SYSTEM = "system"  # key of the variable that chooses a [[system]] by its name
+ORIENTATIONS = "orientations_deg"  # key of a study
 OF_FILES = ("building", "bsdf", "operation", "weather")  # last parts of keys whose values are files
 
 
@@ -211,6 +212,8 @@ class SearchTable(TomlTable):
     quick: bool = True
     front: Annotated[int, Field(ge=1)] = 8  # candidates that are computed in full
     repeats: Annotated[int, Field(ge=0)] = 2  # of the two best with other seeds, for standard errors
+    # one answer for each orientation, entry of [[room]], or climate; None: one for all of them
+    each: Literal["orientation", "room", "climate"] | None = None
 
 
 OWN = ("variable", "objective", "constraint", "search")
@@ -252,6 +255,8 @@ class Design(Study):
             wrong = [value for value in one.options if SYSTEM in _keys_of(one) and value not in self.names]
             if one.key == SYSTEM and wrong:
                 raise ValueError(f"variable.{number}.values: there is no [[system]] {wrong[0]!r}")
+        if self.search.each == "orientation" and any(ORIENTATIONS in _keys_of(one) for one in self.variable):
+            raise ValueError(f"search.each: {ORIENTATIONS} is a variable, so that the best orientation is sought")
         if any(method == "auto" for method in self.methods) or len(self.methods) > 1:
             raise ValueError("methods: expected one, by which the front is computed")
         for key in ("cost", "carbon"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -82,14 +83,12 @@ def answer(result: DesignResult) -> tuple[str, ...]:
         text = gettext(
             "No candidate meets every limit. {name} comes nearest ({values}) and fails {failed}.",
             **first,
-            failed=_failures(best),
+            failed=failures(best),
         )
     sentences = [text]
     others = _best_of_others(result)
     parts = [
-        gettext("{name} fails {failed}", name=one.candidate.label, failed=_failures(one))
-        for one in others
-        if one.failed
+        gettext("{name} fails {failed}", name=one.candidate.label, failed=failures(one)) for one in others if one.failed
     ]
     if parts:
         sentences.append(semicolons(parts) + ".")
@@ -112,33 +111,29 @@ def certainty(result: DesignResult) -> tuple[str, ...]:
     best, second, design = *result.ranked[:2], result.design
     lines = [gettext("Second is {name}: {values}.", name=second.candidate.label, values=_objectives(design, second))]
     if second.failed:
-        lines.append(gettext("{name} fails {failed}", name=second.candidate.label, failed=_failures(second)) + ".")
+        lines.append(gettext("{name} fails {failed}", name=second.candidate.label, failed=failures(second)) + ".")
     if not all(result.errors[:2]):
         lines.append(gettext("The errors of the two are unknown: they were computed once."))
         return tuple(lines)
-    apart = []
-    for number, objective in enumerate(design.objective):
-        difference = second.objectives[number] - best.objectives[number]
-        noise = float(np.hypot(result.errors[0][number], result.errors[1][number]))
+    apart = differences(result)
+    for one in apart:
         words = {
-            "measure": inside(gettext(objective.measure.label)),
-            "difference": f"{significant(abs(difference), 2)} {objective.measure.unit}".strip(),
-            "error": f"{significant(noise, 2)} {objective.measure.unit}".strip(),
+            "measure": inside(gettext(one.objective.measure.label)),
+            "difference": f"{significant(abs(one.difference), 2)} {one.objective.measure.unit}".strip(),
+            "error": f"{significant(one.error, 2)} {one.objective.measure.unit}".strip(),
         }
-        if difference == 0 and noise == 0:
+        if one.none:
             lines.append(gettext("Both have the same {measure}.", measure=words["measure"]))
             continue
-        sure = abs(difference) > SURE * noise
-        apart.append(sure)
         text = (
             gettext("In {measure} they differ by {difference}, more than twice its standard error ({error}).", **words)
-            if sure
+            if one.sure
             else gettext(
                 "In {measure} they differ by {difference}, which is within twice its standard error ({error}).", **words
             )
         )
         lines.append(text)
-    if apart and not any(apart):
+    if equal_within_errors(apart):
         lines.append(gettext("The two are equal within these errors: more rays, or another reason, must decide."))
     count = result.design.search.repeats + 1
     lines.append(
@@ -153,6 +148,42 @@ def certainty(result: DesignResult) -> tuple[str, ...]:
         names = listed([one.limit.label for one in close])
         lines.append(gettext("The best meets these limits by less than 5 %: {names}.", names=names))
     return tuple(lines)
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """An objective of the runner-up less that of the best."""
+
+    objective: ObjectiveTable
+    difference: float
+    error: float  # standard error
+
+    @property
+    def none(self) -> bool:
+        """Whether both are the same without any noise."""
+        return self.difference == 0 and self.error == 0
+
+    @property
+    def sure(self) -> bool:
+        """Whether the difference is more than noise."""
+        return abs(self.difference) > SURE * self.error
+
+
+def differences(result: DesignResult) -> tuple[Difference, ...]:
+    """The runner-up less the best by objective; none where there is one candidate, or their errors are unknown."""
+    if len(result.ranked) < 2 or not all(result.errors[:2]):
+        return ()
+    values = zip(*(one.objectives for one in result.ranked[:2]), *result.errors[:2], strict=True)
+    return tuple(
+        Difference(objective, second - best, float(np.hypot(*errors)))
+        for objective, (best, second, *errors) in zip(result.design.objective, values, strict=True)
+    )
+
+
+def equal_within_errors(every: Sequence[Difference]) -> bool:
+    """Whether two candidates differ in no objective by more than noise."""
+    known = [one for one in every if not one.none]
+    return bool(known) and not any(one.sure for one in known)
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +239,7 @@ def _chart(result: DesignResult, number: int, *, limit: bool = False) -> TradeOf
         kind = "searched" if not case else "best" if one is result.best else "met" if one.feasible else "missed"
         words = colon(one.candidate.label, _objectives(design, one))
         if one.failed:
-            words += ". " + gettext("Fails {failed}", failed=_failures(one))
+            words += ". " + gettext("Fails {failed}", failed=failures(one))
         marks.append(Mark(100 * (x - x0) / (x1 - x0), 100 * (y - y0) / (y1 - y0), kind, words, case))
     title = f"{gettext(design.objective[0].measure.label)} / {y_name.partition(' [')[0]}"
     return TradeOff(title, x_name, y_name, axis_ticks(x0, x1), axis_ticks(y0, y1), tuple(marks))
@@ -335,7 +366,8 @@ def _with_unit(value: float, objective: ObjectiveTable) -> str:
     return f"{rounded(value, measure.digits)} {measure.unit}".strip()
 
 
-def _failures(one: Assessment) -> str:
+def failures(one: Assessment) -> str:
+    """The limits that a candidate does not meet, in words."""
     return ", ".join(_failure(limited) for limited in one.failed)
 
 
