@@ -43,14 +43,7 @@ from mitsuba_cfs.methods.optics import (
     neighbours,
 )
 from mitsuba_cfs.methods.phase_matrices import DEFAULT_NEEDS, PhaseMatrices, with_needs, with_sensors
-from mitsuba_cfs.methods.reflected_sun import (
-    ReflectedSun,
-    SunlitRoom,
-    reflected_sun,
-    reflected_to_sensors,
-    replaced_before,
-    sunlit_room,
-)
+from mitsuba_cfs.methods.reflected_sun import ReflectedSun, reflected_sun, reflected_to_sensors, replaced_before
 from mitsuba_cfs.methods.scene import DaylightScene, Sampling
 from mitsuba_cfs.methods.window_reflection import reflects_outdoors, with_exchange_of
 from mitsuba_cfs.progress import Progress, part, silent
@@ -467,14 +460,6 @@ def shining_hours(light: PhaseLight) -> NDArray[np.int64]:
     return np.flatnonzero(np.any(sky.direction @ facing.T > 0, axis=1) & lit)
 
 
-def _sunlit_room(light: PhaseLight, coefficients: Sequence[Sequence[GroupCoefficients]]) -> SunlitRoom | None:
-    """The room that the sun's beam lights; None where no group passes one."""
-    outdoors = coefficients[: len(light.scene.outdoor_groups)]
-    if light.reflected is None or not any(_passes_beam(one) for group in outdoors for one in group):
-        return None
-    return sunlit_room(light.matrices, light.reflected)
-
-
 def _reflected_to_sensors(
     light: PhaseLight, coefficients: Sequence[Sequence[GroupCoefficients]]
 ) -> dict[tuple[int, int], tuple[Array, Array, Estimate]]:
@@ -484,8 +469,7 @@ def _reflected_to_sensors(
     outdoors = coefficients[: len(light.scene.outdoor_groups)]
     each = {(g, j): one for g, group in enumerate(outdoors) for j, one in enumerate(group)}
     groups = [(g, one) for (g, _), one in each.items()]
-    room = _sunlit_room(light, coefficients)
-    return dict(zip(each, reflected_to_sensors(light.matrices, light.reflected, room, groups), strict=True))
+    return dict(zip(each, reflected_to_sensors(light.matrices, light.reflected, groups), strict=True))
 
 
 def _passes_beam(one: GroupCoefficients) -> bool:

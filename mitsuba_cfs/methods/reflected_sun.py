@@ -10,13 +10,15 @@ place, and few paths of a window meet the sun's patch after a reflection.  In pl
 the five-phase method computes this light at points that represent the outdoor surfaces
 (`mitsuba_cfs.trace.sun.reflected`) and in cells of the room
 (`mitsuba_cfs.trace.sun.sunlit_sensors`), in independent batches, which give its standard error.
+Rays are traced with open windows; what they give is in the cache for all systems
+(`mitsuba_cfs.trace.sun.open_windows`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -29,11 +31,16 @@ from mitsuba_cfs.phases import times_sky
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.surfaces import SurfaceGroups
 from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate
-from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
-from mitsuba_cfs.trace.sun.reflected import Straight, outdoor_light, view_shares, window_shares
-from mitsuba_cfs.trace.sun.sunlit_cells import Beam, RoomCells
-from mitsuba_cfs.trace.sun.sunlit_sensors import room_cells, room_light, shares_and_derivatives
+from mitsuba_cfs.trace.sun.open_windows import Suns, SunScenes, open_beam_light, seen_through, sunlit_windows
+from mitsuba_cfs.trace.sun.sunlit_cells import OpenBeam, RoomCells, transmitted
+from mitsuba_cfs.trace.sun.sunlit_sensors import (
+    OpenBeamLight,
+    beam_light,
+    room_cells,
+    room_light,
+    shares_and_derivatives,
+)
 
 BATCHES = 4  # each with its own paths and points
 WINDOW_SHARE = 32  # paths of a patch for D, for each that looks for sunlit surfaces
@@ -53,8 +60,9 @@ class ReflectedSun:
     outside: TracedScene  # what is in front of the window parts, in the room's coordinates
     before: tuple[NDArray[np.float32], ...]  # [BATCHES][Q, K, h] luminance outside the windows
     by_patches: Array  # D - D_d [Q, K, P], which it replaces; 0 without outdoor surfaces
-    # flux on the room's cells [c, BATCHES * h] by group and scattering, for other sensors and reflectances
-    fluxes: dict[tuple[int, int], tuple[Scattering, sparse.csr_array]] = field(default_factory=dict)
+    # flux on the room's cells by specular path [N][c, BATCHES * h] through each open group, for other sensors,
+    # reflectances and states
+    fluxes: dict[int, list[sparse.csr_array]] = field(default_factory=dict)
 
     @property
     def suns(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -92,12 +100,16 @@ def reflected_sun(matrices: PhaseMatrices, sky: AnnualSky) -> ReflectedSun:
     by_patches = matrices.daylight.values - direct_daylight(matrices)
     if not len(scene.exterior.triangles):
         return ReflectedSun(sky, shining, inside, outside, (), by_patches)
-    suns = sky.direction[shining], sky.illuminance[shining]
     paths = sampling.patch_samples // WINDOW_SHARE // BATCHES
-    samples = max(paths * len(scene.groups) // len(parts), 4)
-    shares = window_shares(outside, samples=samples, places=sampling.sun_points, seeds=_seeds(matrices))
-    before = (light.reshape(*by_patches.shape[:2], -1) for light in outdoor_light(shares, outside, *suns))
-    return ReflectedSun(sky, shining, inside, outside, tuple(before), by_patches)
+    found = sunlit_windows(
+        SunScenes(inside, outside, (scene.exterior, parts), matrices.cache),
+        Suns(sky.direction[shining], sky.illuminance[shining]),
+        samples=max(paths * len(scene.groups) // len(parts), 4),
+        places=sampling.sun_points,
+        seeds=_seeds(matrices),
+    )
+    before = tuple(light.reshape(*by_patches.shape[:2], -1) for light in found)
+    return ReflectedSun(sky, shining, inside, outside, before, by_patches)
 
 
 def sunlit_room(matrices: PhaseMatrices, sun: ReflectedSun) -> SunlitRoom | None:
@@ -132,19 +144,46 @@ def _sunlit(matrices: PhaseMatrices, sun: ReflectedSun, by_groups: SurfaceGroups
 
 
 def reflected_to_sensors(
-    matrices: PhaseMatrices, sun: ReflectedSun, room: SunlitRoom | None, groups: Sequence[tuple[int, GroupCoefficients]]
+    matrices: PhaseMatrices, sun: ReflectedSun, groups: Sequence[tuple[int, GroupCoefficients]]
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64], Estimate]]:
     """Illuminance to add to that of the sensors through groups in a state each [S, L] [lx].
-
-    Args: room: None where no beam of the sun passes any group.
 
     Returns: of each group what is added, the part of it that is the sun's beam in the room, and
         what was traced of it, in the hours h with sun [S, h].
     """
     seen = iter(_outdoors_seen(matrices, sun, groups))
+    beams = _open_beams(matrices, sun, [g for g, one in groups if beam_matrix(one.optics).any()])
     return [
-        _to_sensors(matrices, sun, room, one, g, next(seen) if one.straight is not None else ()) for g, one in groups
+        _to_sensors(matrices, sun, beams, one, g, next(seen) if one.straight is not None else ()) for g, one in groups
     ]
+
+
+def _open_beams(matrices: PhaseMatrices, sun: ReflectedSun, groups: Sequence[int]) -> dict[int, list[OpenBeamLight]]:
+    """Light of the sensors by the beam through open groups that the room reflects, by specular path."""
+    scene, sampling = matrices.scene, matrices.sampling
+    if not (scene.interior.reflectance > 0).any():
+        return {}
+    scenes = _scenes(matrices, sun)
+    samples, points, seeds = _sensor_samples(matrices, ROOM_SHARE), sampling.sun_points, tuple(_seeds(matrices))
+
+    @cache
+    def room() -> SunlitRoom:
+        return _sunlit(matrices, sun, None)[0]
+
+    def traced(g: int) -> list[OpenBeamLight]:
+        return [OpenBeamLight.of(room().shares, flux) for flux in _open_flux(matrices, sun, room().cells, g)]
+
+    return {
+        g: open_beam_light(scenes, (g, *scene.sensors(), sun.suns[0], samples, points, seeds), partial(traced, g))
+        for g in dict.fromkeys(groups)
+    }
+
+
+def _scenes(matrices: PhaseMatrices, sun: ReflectedSun) -> SunScenes:
+    """The room and what is in front of its window groups, for sensors that see both."""
+    scene = matrices.scene
+    key = scene.interior, scene.exterior, tuple(scene.groups), tuple(matrices.parts.groups)
+    return SunScenes(sun.inside, sun.outside, key, matrices.cache)
 
 
 def beams_in_rooms(
@@ -175,42 +214,48 @@ def beams_by_batch(
 def _flux(
     matrices: PhaseMatrices, sun: ReflectedSun, cells: RoomCells, group: GroupCoefficients, g: int
 ) -> sparse.csr_array:
-    """Flux of the sun's beam through a group on the room's cells [c, BATCHES * h], stored with the sun."""
-    scattering = group.optics.scattering
-    key = g, id(scattering)
-    if key in sun.fluxes:
-        return sun.fluxes[key][1]
-    scenes, points = (sun.inside, sun.outside), matrices.sampling.sun_points
-    flux = Beam(scenes, g, scattering, points, tuple(_seeds(matrices))).flux(cells, sun.suns[0])
-    if flux.nnz + sum(other.nnz for _, other in sun.fluxes.values()) <= MOST_FLUX:
-        sun.fluxes[key] = scattering, flux
+    """Flux of the sun's beam through a group on the room's cells [c, BATCHES * h]."""
+    tau = _open_beam(matrices, sun, g).transmittance(group.optics.scattering, sun.suns[0])
+    return transmitted(_open_flux(matrices, sun, cells, g), tau)
+
+
+def _open_flux(matrices: PhaseMatrices, sun: ReflectedSun, cells: RoomCells, g: int) -> list[sparse.csr_array]:
+    """The same through the open group by specular path, stored with the sun."""
+    if g in sun.fluxes:
+        return sun.fluxes[g]
+    flux = _open_beam(matrices, sun, g).flux(cells, sun.suns[0])
+    stored = sum(one.nnz for other in sun.fluxes.values() for one in other)
+    if stored + sum(one.nnz for one in flux) <= MOST_FLUX:
+        sun.fluxes[g] = flux
     return flux
+
+
+def _open_beam(matrices: PhaseMatrices, sun: ReflectedSun, g: int) -> OpenBeam:
+    return OpenBeam((sun.inside, sun.outside), g, matrices.sampling.sun_points, tuple(_seeds(matrices)))
 
 
 def _outdoors_seen(
     matrices: PhaseMatrices, sun: ReflectedSun, groups: Sequence[tuple[int, GroupCoefficients]]
-) -> list[Sequence[NDArray[np.float32]]]:
+) -> list[list[NDArray[np.float32]]]:
     """Light of the sensors from what they see straight through groups [S, h], by batch."""
-    straight = [Straight(g, o.optics.scattering) for g, o in groups if o.straight is not None]
+    straight = [(g, o.optics.scattering) for g, o in groups if o.straight is not None]
     if not sun.before:
-        return [()] * len(straight)
-    views = view_shares(
-        sun.inside,
-        sun.outside,
+        return [[] for _ in straight]
+    return seen_through(
+        _scenes(matrices, sun),
         straight,
         matrices.scene.sensors(),
+        Suns(*sun.suns),
         samples=_sensor_samples(matrices, SENSOR_SHARE),
         places=matrices.sampling.sun_points,
         seeds=_seeds(matrices),
     )
-    light = outdoor_light(views, sun.outside, *sun.suns)
-    return [light[i : i + BATCHES] for i in range(0, len(light), BATCHES)]
 
 
 def _to_sensors(
     matrices: PhaseMatrices,
     sun: ReflectedSun,
-    room: SunlitRoom | None,
+    beams: Mapping[int, Sequence[OpenBeamLight]],
     group: GroupCoefficients,
     g: int,
     seen: Sequence[NDArray[np.float32]],
@@ -218,8 +263,9 @@ def _to_sensors(
     """`reflected_to_sensors` of one group; seen: of `_outdoors_seen`, none without a beam."""
     parts, in_room = matrices.parts.of(g), []
     rest = [without_straight(matrices, group, q) for q in parts]
-    if room is not None and beam_matrix(group.optics).any():
-        in_room = room_light(room.shares, _flux(matrices, sun, room.cells, group, g), sun.suns[1])
+    if g in beams and beam_matrix(group.optics).any():
+        tau = _open_beam(matrices, sun, g).transmittance(group.optics.scattering, sun.suns[0])
+        in_room = beam_light(beams[g], tau, sun.suns[1])
 
     def light_of(batch: int) -> NDArray[np.float64]:
         """The light of the sensors in the hours with sun [S, h]."""

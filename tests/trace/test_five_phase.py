@@ -15,7 +15,7 @@ from mitsuba_cfs.methods.light import daylight_coefficients, illuminance, illumi
 from mitsuba_cfs.methods.phase_light import SensorLight, over_hours, phase_light
 from mitsuba_cfs.methods.phase_matrices import phase_matrices
 from mitsuba_cfs.methods.point_in_time import PathLight
-from mitsuba_cfs.methods.reflected_sun import reflected_sun, reflected_to_sensors, sunlit_room
+from mitsuba_cfs.methods.reflected_sun import reflected_sun, reflected_to_sensors
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
@@ -96,7 +96,7 @@ def test_the_sum_of_the_groups_is_the_five_phase_sum(corner):
     groups = [one for (one,) in group_coefficients(matrices, [[one] for one in chosen])]
     sun = reflected_sun(matrices, sky)
     expected -= np.einsum("sgk,gkh->sh", view - direct_view, by_patch)
-    for added, _, _ in reflected_to_sensors(matrices, sun, sunlit_room(matrices, sun), list(enumerate(groups))):
+    for added, _, _ in reflected_to_sensors(matrices, sun, list(enumerate(groups))):
         expected += added
     whole, direct = groups[0].straight.values.values, groups[0].straight.direct
     lost = direct_view[:, 0] * groups[0].beam

@@ -137,6 +137,7 @@ def test_runs_in_one_launch_have_the_light_that_each_has_alone(monkeypatch):
     """Batches share launches, as many as fit; the random numbers of each are its own."""
     from mitsuba_cfs.trace.kernels.scene import TracedScene
     from mitsuba_cfs.trace.sun import reflected as module
+    from mitsuba_cfs.trace.sun import sun_at_points
 
     outside = TracedScene(overhang(2.0), rooms.test_room()[1])
     suns, lux = np.array([towards(40, 180), towards(60, 120), towards(30, 50)]), np.full(3, LUX)
@@ -144,8 +145,8 @@ def test_runs_in_one_launch_have_the_light_that_each_has_alone(monkeypatch):
     alone = [module.window_shares(outside, seeds=[seed], **options)[0] for seed in seeds]
     each = [module.outdoor_light([one], outside, suns, lux)[0] for one in alone]
     assert all(one.any() for one in each) and not np.array_equal(*each[:2])
-    for lanes in (module.LANES, 2 * K * 4, 100):  # all, two and one in a launch, hours apart
-        monkeypatch.setattr(module, "LANES", lanes)
+    for lanes in (sun_at_points.LANES, 2 * K * 4, 100):  # all, two and one in a launch, hours apart
+        monkeypatch.setattr(sun_at_points, "LANES", lanes)
         together = module.window_shares(outside, seeds=seeds, **options)
         light = module.outdoor_light(together, outside, suns, lux)
         np.testing.assert_array_equal(light, each)

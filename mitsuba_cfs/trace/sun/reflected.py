@@ -13,7 +13,7 @@ represent others nearby as the virtual lights of Keller 1997, "Instant radiosity
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -26,11 +26,12 @@ from scipy import sparse
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
 from mitsuba_cfs.trace.kernels.sampling import batch_key, column, lattice_2d, opaque, tables, vectors
-from mitsuba_cfs.trace.kernels.scattering import Scattering
+from mitsuba_cfs.trace.kernels.scattering import OpenWindow, Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.matrices.straight_view import straight_rays
-from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_points, reflecting_points, sunlight_of_many
+from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_points, reflecting_points
 from mitsuba_cfs.trace.sun.outdoors import MOST_MIRRORS, PixelRays, RoughFaces, mirrored
+from mitsuba_cfs.trace.sun.sun_at_points import SunAtPoints, blocks, sun_at_points, together
 
 BOUNCES = 32  # surfaces that a path meets at most; roulette ends most before
 PLACES = 1024  # largest number of points that represent the hits of paths, by default
@@ -39,7 +40,6 @@ MORTON_BITS = 12  # along each axis
 # shifts and masks that leave two empty bits behind each of up to 16
 SPREAD_BITS = ((16, 0xFF0000FF), (8, 0xF00F00F00F), (4, 0xC30C30C30C3), (2, 0x249249249249))
 ROUGH = 4096  # rough faces whose lobes a row sees, at most
-LANES = 2**22  # shadow rays at once
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,16 +62,45 @@ class SunShares:
         places = SurfacePoints.joined([m.places for m in met])
         row = np.concatenate([np.empty(0, dtype=np.int64), *(m.row for m in met)])
         weight = np.concatenate([np.empty(0), *(m.weight for m in met)])
-        rough = None
-        if any(m.rough for m in met):
-            rough = _few(RoughFaces.joined([part for m in met for part in m.rough]))
-        if not len(weight):
-            return cls(places, sparse.csr_array((rows, 0)), rough)
-        of_row = weight / np.bincount(row, weight, rows)[row]
-        run, chosen = _runs(places, of_row, most, np.random.default_rng(seed))
-        few = places.some(chosen)
-        share = sparse.csr_array(sparse.coo_array((weight, (row, run)), shape=(rows, len(chosen))))
-        return cls(few, share, rough)
+        few, run = _represented(places, row, weight, rows, seed, most)
+        rough = RoughFaces.joined([part for m in met for part in m.rough])
+        share = _sums(weight, row, run, (rows, few.size))
+        return cls(few, share, _few(rough) if len(rough.weight) else None)
+
+
+@dataclass(frozen=True, slots=True)
+class ViewShares:
+    """The same seen by sensors through an open window group: for any straight beam in it."""
+
+    places: SurfacePoints  # [m]
+    sensors: int  # S
+    sensor: NDArray[np.integer]  # [n] of each hit of a path
+    place: NDArray[np.integer]  # [n] that represents the hit
+    weight: NDArray[np.float32]  # [n]
+    way: NDArray[np.float32]  # [n, 3] local direction in which the path passes the window
+    rough: tuple[RoughFaces, NDArray[np.float32]] | None = None  # of the sensors, with the same directions
+
+    def through(self, scattering: Scattering) -> SunShares:
+        """The shares of the sensors through a system's straight beam."""
+        tau = _through(scattering, self.way)
+        share = _sums(self.weight * tau, self.sensor, self.place, (self.sensors, self.places.size))
+        if self.rough is None:
+            return SunShares(self.places, share)
+        rough, way = self.rough
+        return SunShares(self.places, share, replace(rough, weight=rough.weight * _through(scattering, way)))
+
+
+def _through(scattering: Scattering, way: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Transmittance of the straight beam along local directions [n, 3]."""
+    if not len(way):
+        return np.empty(0, dtype=np.float32)
+    return np.broadcast_to(scattering.through(vectors(way)).numpy(), len(way))
+
+
+def _sums(
+    weight: NDArray[np.floating], row: NDArray[np.integer], column: NDArray[np.integer], shape: tuple[int, int]
+) -> sparse.csr_array:
+    return sparse.csr_array(sparse.coo_array((weight, (row, column)), shape=shape))
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,14 +111,6 @@ class _Met:
     weight: NDArray[np.float64]
     places: SurfacePoints
     rough: list[RoughFaces]
-
-
-@dataclass(frozen=True, slots=True)
-class Straight:
-    """The straight beam of a window group, through which sensors see the outdoors."""
-
-    group: int
-    scattering: Scattering
 
 
 def window_shares(
@@ -115,36 +136,59 @@ def window_shares(
         return _first_met(outside, row, weight, position, way)
 
     starts = [partial(begun, seed) for seed in seeds]
-    return _shares_of(outside, starts, seeds, (count, samples), places)
+    met = _met_by(outside, starts, seeds, count * samples)
+    return [SunShares.of([one], count, seed, most=places) for one, seed in zip(met, seeds, strict=True)]
 
 
 def view_shares(
     inside: TracedScene,
     outside: TracedScene,
-    beams: Sequence[Straight],
+    groups: Sequence[int],
     sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
     *,
     samples: int,
     places: int = PLACES,
     seeds: Sequence[int] = (0,),
-) -> list[SunShares]:
-    """Sunlit outdoor surfaces that sensors see through straight beams; rows [S].
+) -> list[ViewShares]:
+    """Sunlit outdoor surfaces that sensors see straight through open window groups.
 
     Args:
-        sensors: positions and normals [S, 3].
+        groups: numbers of the groups; sensors: positions and normals [S, 3].
         samples: points on the group for each sensor; places: as for `window_shares`.
 
-    Returns: of each beam, for each of the seeds.
+    Returns: of each group, for each of the seeds.
     """
+    ways: list[NDArray[np.float32]] = []
 
-    def begun(beam: Straight, seed: int) -> _Met:
+    def begun(group: int, seed: int) -> _Met:
         key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
-        sensor, target, omega, weight = straight_rays(inside, beam.group, beam.scattering, sensors, samples, key)
-        return _first_met(outside, sensor, weight / samples, target, omega)
+        _, target, omega, weight = straight_rays(inside, group, OpenWindow(), sensors, samples, key)
+        local = inside.to_group(group, omega)
+        dr.eval(target, omega, weight, local)
+        ways.append(np.ascontiguousarray(local.numpy().T, dtype=np.float32))
+        ray = dr.arange(mi.UInt32, dr.width(weight))
+        return _first_met(outside, ray, weight / samples, target, omega)
 
-    starts = [partial(begun, beam, seed) for beam in beams for seed in seeds]
-    shape = len(sensors[0]), samples
-    return _shares_of(outside, starts, [*seeds] * len(beams), shape, places)
+    count, pairs = len(sensors[0]), [(g, seed) for g in groups for seed in seeds]
+    every = _met_by(outside, [partial(begun, *pair) for pair in pairs], [s for _, s in pairs], count * samples)
+    return [
+        _seen(met, way, (count, samples), seed, places) for met, way, (_, seed) in zip(every, ways, pairs, strict=True)
+    ]
+
+
+def _seen(met: _Met, way: NDArray[np.float32], shape: tuple[int, int], seed: int, most: int) -> ViewShares:
+    """What the sensors see, from hits whose rows are numbers of rays, and the directions of all rays [n, 3]."""
+    count, samples = shape
+    sensor, rough = met.row // samples, None
+    places, place = _represented(met.places, sensor, met.weight, count, seed, most)
+    faces = RoughFaces.joined(met.rough)
+    if len(faces.weight):
+        # `_few` takes rows for rays: the directions follow by the ray's number
+        few = _few(faces, faces.pixel // samples)
+        rough = replace(few, pixel=few.pixel // samples), way[few.pixel]
+    smallest = (np.min_scalar_type(max(n - 1, 0)) for n in (count, places.size))
+    sensor, place = (a.astype(t) for a, t in zip((sensor, place), smallest, strict=True))
+    return ViewShares(places, count, sensor, place, met.weight.astype(np.float32), way[met.row], rough)
 
 
 def outdoor_light(
@@ -152,79 +196,54 @@ def outdoor_light(
 ) -> list[NDArray[np.float32]]:
     """Light of the rows of each set [rows, h] from sunlit outdoor surfaces.
 
-    Points of several sets are in one launch as long as these are small.
-
     Args: suns: [h, 3]; strength: [h] irradiance normal to it.
     """
-    strength, light = strength.astype(np.float32), []
-    each = [shares.places.size * len(suns) for shares in sets]
-    for block in _together(each):
-        light += _light_of_block(sets[block], outside, suns, strength)
+    sun = sun_at_points(outside, [one.places for one in sets], suns)
+    return [light_of_rows(one, at, outside, suns, strength) for one, at in zip(sets, sun, strict=True)]
+
+
+def light_of_rows(
+    shares: SunShares, sun: SunAtPoints, outside: TracedScene, suns: NDArray[np.float64], strength: NDArray[np.float64]
+) -> NDArray[np.float32]:
+    """Light of rows [rows, h] by the sun at their points; rays are traced for rough gloss alone."""
+    light = np.zeros((shares.share.shape[0], len(suns)), dtype=np.float32)
+    share, strength = shares.share.astype(np.float32), strength.astype(np.float32)
+    for hours in blocks(shares.places.size, len(suns)):
+        light[:, hours] = share @ sun.light(shares.places, suns, hours) * strength[hours]
+    if shares.rough is not None:
+        count = len(shares.rough.weight)
+        entries = shares.rough.weight, (shares.rough.pixel, np.arange(count))
+        of_row = sparse.csr_array(entries, shape=(len(light), count), dtype=np.float32)
+        for hours in blocks(count, len(suns)):
+            light[:, hours] += of_row @ shares.rough.lobes(outside, suns[hours]) * strength[hours]
     return light
 
 
-def _light_of_block(
-    sets: Sequence[SunShares], outside: TracedScene, suns: NDArray[np.float64], strength: NDArray[np.float32]
-) -> list[NDArray[np.float32]]:
-    """Light of the rows of some sets [rows, h]."""
-    light = [np.zeros((one.share.shape[0], len(suns)), dtype=np.float32) for one in sets]
-    share = [one.share.astype(np.float32) for one in sets]
-    places, counts = SurfacePoints.joined([o.places for o in sets]), [o.places.size for o in sets]
-    number, first = np.concatenate([np.arange(n) for n in counts]), np.cumsum([0, *counts])
-    for hours in _blocks(places.size, len(suns)):
-        at_places = sunlight_of_many(outside, places, suns[hours], number)
-        for i, values in enumerate(light):
-            values[:, hours] = share[i] @ at_places[first[i] : first[i + 1]] * strength[hours]
-    for one, values in zip(sets, light, strict=True):
-        if one.rough is None:
-            continue
-        count = len(one.rough.weight)
-        entries = one.rough.weight, (one.rough.pixel, np.arange(count))
-        of_row = sparse.csr_array(entries, shape=(len(values), count), dtype=np.float32)
-        for hours in _blocks(count, len(suns)):
-            values[:, hours] += of_row @ one.rough.lobes(outside, suns[hours]) * strength[hours]
-    return light
+def _met_by(outside: TracedScene, starts: Sequence[Callable[[], _Met]], seeds: Sequence[int], size: int) -> list[_Met]:
+    """What the paths of several runs meet, first and later; small runs share launches.
 
-
-def _together(sizes: Sequence[int]) -> Iterator[slice]:
-    """Neighbours whose sizes sum to `LANES` at most, and larger ones alone."""
-    first, total = 0, 0
-    for i, size in enumerate(sizes):
-        if i > first and total + size > LANES:
-            yield slice(first, i)
-            first, total = i, 0
-        total += size
-    if sizes:
-        yield slice(first, len(sizes))
-
-
-def _shares_of(
-    outside: TracedScene, starts: Sequence[Callable[[], _Met]], seeds: Sequence[int], shape: tuple[int, int], most: int
-) -> list[SunShares]:
-    """Shares of what paths meet after what they meet first, those of several runs in one launch.
-
-    Args: starts: give what the paths of each run meet first; shape: rows, and paths of each.
+    Args: starts: give what the paths of each run meet first; size: number of paths of each.
     """
-    rows, samples = shape
-    shares = []
-    for block in _together([rows * samples] * len(starts)):
+    every = []
+    for block in together([size] * len(starts)):
         begun = [start() for start in starts[block]]
         runs = [(s, one.places.size) for s, one in zip(seeds[block], begun, strict=True)]
         joined = SurfacePoints.joined([one.places for one in begun])
         later = reflecting_points(outside, joined, runs, BOUNCES, mirrored=True)
         ends = np.cumsum([count for _, count in runs])
         run = np.searchsorted(ends, later.path, side="right")
-        for i, (one, (seed, count)) in enumerate(zip(begun, runs, strict=True)):
+        for i, (one, (_, count)) in enumerate(zip(begun, runs, strict=True)):
             some = np.flatnonzero(run == i)
             path = later.path[some] - (ends[i] - count)
-            met = _Met(
-                np.concatenate([one.row, one.row[path]]),
-                np.concatenate([one.weight, one.weight[path] * later.weight[some]]),
-                SurfacePoints.joined([one.places, later.places.some(some)]),
-                one.rough,
+            every.append(
+                _Met(
+                    np.concatenate([one.row, one.row[path]]),
+                    np.concatenate([one.weight, one.weight[path] * later.weight[some]]),
+                    SurfacePoints.joined([one.places, later.places.some(some)]),
+                    one.rough,
+                )
             )
-            shares.append(SunShares.of([met], rows, seed, most=most))
-    return shares
+    return every
 
 
 def _first_met(outside: TracedScene, row: mi.UInt32, weight: mi.Float, origin: mi.Point3f, way: mi.Vector3f) -> _Met:
@@ -270,16 +289,31 @@ def _rough(
     return RoughFaces(some.row, some.weight, faces, some.way, places.some(rough))
 
 
-def _few(rough: RoughFaces) -> RoughFaces:
-    """The first `ROUGH` faces of each row, spread as evenly as all."""
-    order = np.argsort(rough.pixel, kind="stable")
-    row = rough.pixel[order]
+def _few(rough: RoughFaces, rows: NDArray[np.int64] | None = None) -> RoughFaces:
+    """The first `ROUGH` faces of each row, spread as evenly as all.
+
+    Args: rows: of the faces, where their pixels are other numbers.
+    """
+    rows = rough.pixel if rows is None else rows
+    order = np.argsort(rows, kind="stable")
+    row = rows[order]
     kept = order[np.arange(len(row)) - np.searchsorted(row, row) < ROUGH]
-    rows = int(rough.pixel.max(initial=0)) + 1
-    of_all = np.bincount(rough.pixel, rough.weight, rows)
-    of_kept = np.bincount(rough.pixel[kept], rough.weight[kept], rows)
+    count = int(rows.max(initial=0)) + 1
+    of_all = np.bincount(rows, rough.weight, count)
+    of_kept = np.bincount(rows[kept], rough.weight[kept], count)
     few = rough.some(kept)
-    return replace(few, weight=few.weight * (of_all / np.maximum(of_kept, 1e-30))[few.pixel])
+    return replace(few, weight=few.weight * (of_all / np.maximum(of_kept, 1e-30))[rows[kept]])
+
+
+def _represented(
+    places: SurfacePoints, row: NDArray[np.int64], weight: NDArray[np.float64], rows: int, seed: int, most: int
+) -> tuple[SurfacePoints, NDArray[np.int64]]:
+    """Points that represent others nearby, and which of them represents each."""
+    if not len(weight):
+        return places, row
+    of_row = weight / np.bincount(row, weight, rows)[row]
+    run, chosen = _runs(places, of_row, most, np.random.default_rng(seed))
+    return places.some(chosen), run
 
 
 def _runs(
@@ -323,9 +357,3 @@ def _morton(point: NDArray[np.float32]) -> NDArray[np.int64]:
     for shift, mask in SPREAD_BITS:
         cell = (cell | cell << shift) & mask
     return cell @ [1, 2, 4]
-
-
-def _blocks(places: int, hours: int) -> list[slice]:
-    """Blocks of hours whose shadow rays are traced at once."""
-    step = max(1, LANES // max(places, 1))
-    return [slice(start, start + step) for start in range(0, hours if places else 0, step)]

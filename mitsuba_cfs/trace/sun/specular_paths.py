@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.sky.sun import SUN_RADIUS
 from mitsuba_cfs.surfaces import triangle_areas
-from mitsuba_cfs.trace.kernels.sampling import lattice_2d, opaque, opaque_vector
+from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, opaque_vector, vectors
+from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 
 SPREAD = float(1.01 * SUN_RADIUS)  # of directions on the disc about its middle, at most
@@ -19,6 +20,8 @@ BEFORE = 1e-3  # [m] in front of a window's plane, where a mirror must be to sen
 MOST_MIRRORS = 3  # on a path: of a fourth pane of 15 % comes 0.05 % of the sun
 MOST_SEQUENCES = 8  # of two mirrors or more: each costs as many rays as the direct sun
 LEAST = 1e-9  # of a direction along an axis, to divide by
+DISC_POINTS = 16  # of a disc, for its mean transmittance
+TURN = 0.5 * (3 - 5**0.5)  # of a spiral between neighbours, the golden section of it
 CLEAR = 10  # steps off a surface that a box is wider by than what it holds
 
 
@@ -166,3 +169,19 @@ def disc_direction(centre: mi.Vector3f, u: mi.Point2f) -> mi.Vector3f:
     phi = dr.two_pi * u.y
     frame = mi.Frame3f(centre)
     return frame.to_world(mi.Vector3f(sine * dr.cos(phi), sine * dr.sin(phi), cosine))
+
+
+def beam_transmittance(scattering: Scattering, towards: NDArray[np.float64]) -> NDArray[np.float32]:
+    """Transmittance of a straight beam, the mean over discs [n] about local directions [n, 3]; 0 from the room."""
+    found = np.zeros(len(towards), dtype=np.float32)
+    outdoors = np.flatnonzero(towards[:, 2] > -SPREAD)
+    if not len(outdoors):
+        return found
+    number = (np.arange(DISC_POINTS) + 0.5) / DISC_POINTS
+    u = mi.Point2f(
+        column(np.tile(number, len(outdoors))), column(np.tile(np.arange(DISC_POINTS) * TURN % 1.0, len(outdoors)))
+    )
+    way = disc_direction(vectors(np.repeat(towards[outdoors], DISC_POINTS, axis=0)), u)
+    tau = dr.select(way.z > 0, scattering.through(way), 0.0).numpy()
+    found[outdoors] = np.broadcast_to(tau, len(outdoors) * DISC_POINTS).reshape(-1, DISC_POINTS).mean(axis=1)
+    return found

@@ -14,6 +14,7 @@ the light changes from pixel to pixel, and too few rays would meet a piece to co
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 
@@ -28,7 +29,7 @@ from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, opaqu
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_faces, on_disc_of
-from mitsuba_cfs.trace.sun.specular_paths import SPREAD, SpecularPath, specular_sun_paths
+from mitsuba_cfs.trace.sun.specular_paths import SPREAD, SpecularPath, beam_transmittance, specular_sun_paths
 
 CELLS = 4096  # that the surfaces' area is divided into, about, on either side
 AREA_POINTS = 2**18  # that the cells' areas are counted by
@@ -141,12 +142,11 @@ def _surface_cells(inside: TracedScene) -> CellPoints:
 
 
 @dataclass(frozen=True, slots=True)
-class Beam:
-    """The straight beam of the sun through a window group, followed to where it falls."""
+class OpenBeam:
+    """The sun through an open window group, by each specular path, followed to where it falls."""
 
     scenes: tuple[TracedScene, TracedScene]  # the room with its window groups, and the outdoors
     group: int
-    scattering: Scattering
     points: int = POINTS  # on the group, for hours whose sun does not reach all of them
     seeds: tuple[int, ...] = (0,)  # of batches B, each with its own points
 
@@ -155,36 +155,50 @@ class Beam:
         """Points for hours whose sun reaches all of them."""
         return max(self.points // EDGE_SHARE, 1)
 
-    def flux(self, cells: RoomCells, suns: NDArray[np.float64]) -> sparse.csr_array:
-        """Luminous flux on the cells [c, B * h], per unit illuminance normal to the sun [m2].
+    def paths(self) -> list[SpecularPath]:
+        """The specular paths, axis N."""
+        return specular_sun_paths(self.scenes[1])
 
-        Args: suns: [h, 3] directions.
+    def transmittance(self, scattering: Scattering, suns: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Transmittance of a system's straight beam for suns by each path [N, h]."""
+        frame = self.scenes[0].groups[self.group].frame
+        return np.stack([beam_transmittance(scattering, by.apparent(suns) @ frame.T) for by in self.paths()])
+
+    def flux(
+        self, cells: RoomCells, suns: NDArray[np.float64], through: NDArray[np.bool_] | None = None
+    ) -> list[sparse.csr_array]:
+        """Luminous flux on the cells by each path [N][c, B * h], per illuminance normal to the sun [m2].
+
+        Args: suns: [h, 3] directions; through: [N, h] those that are followed, by default all.
         """
-        step, columns = max(RAYS // self.fewer, 1), np.arange(len(self.seeds) * len(suns))
-        blocks = [self._flux(cells, suns, columns[i : i + step]) for i in range(0, len(columns), step)]
-        return sparse.csr_array(sparse.hstack([sparse.csr_array((cells.size, 0)), *blocks]))
+        facing, count = self.scenes[0].groups[self.group].frame[2], len(suns)
+        found = []
+        for n, by in enumerate(self.paths()):
+            some = by.apparent(suns) @ facing > -SPREAD
+            some &= through[n] if through is not None else True
+            columns = np.flatnonzero(np.tile(some, len(self.seeds)))
+            flux = sparse.csr_array((cells.size, len(self.seeds) * count))
+            step = max(RAYS // self.fewer, 1) if cells.size else len(columns) + 1
+            for start in range(0, len(columns) if cells.size else 0, step):
+                flux = flux + self._flux(by, cells, suns, columns[start : start + step])
+            found.append(flux)
+        return found
 
-    def _flux(self, cells: RoomCells, suns: NDArray[np.float64], columns: NDArray[np.int64]) -> sparse.csr_array:
-        """Some columns [n] of the flux."""
-        flux = sparse.csr_array((cells.size, len(columns)))
-        if not cells.size:
-            return flux
-        for by in specular_sun_paths(self.scenes[1]):
-            before = by.apparent(suns) @ self.scenes[0].groups[self.group].frame[2] > -SPREAD
-            some = np.flatnonzero(before[columns % len(suns)])
-            if not len(some):
-                continue
-            value, position, to_sun = self._entering(by, suns, columns[some], self.fewer)
-            lit = value > 0
-            crossed = lit.any(axis=1) & ~lit.all(axis=1)
-            value[crossed] = 0
-            flux = flux + self._landed(cells, value, position, to_sun, some, len(columns))
-            some = some[crossed]
-            step = max(RAYS // self.points, 1)
-            for start in range(0, len(some), step):
-                part = some[start : start + step]
-                rays = self._entering(by, suns, columns[part], self.points)
-                flux = flux + self._landed(cells, *rays, part, len(columns))
+    def _flux(
+        self, by: SpecularPath, cells: RoomCells, suns: NDArray[np.float64], columns: NDArray[np.int64]
+    ) -> sparse.csr_array:
+        """Some of the columns of the flux, the others empty."""
+        count = len(self.seeds) * len(suns)
+        value, position, to_sun = self._entering(by, suns, columns, self.fewer)
+        lit = value > 0
+        crossed = lit.any(axis=1) & ~lit.all(axis=1)
+        value[crossed] = 0
+        flux = self._landed(cells, value, position, to_sun, columns, count)
+        some = columns[crossed]
+        step = max(RAYS // self.points, 1)
+        for start in range(0, len(some), step):
+            part = some[start : start + step]
+            flux = flux + self._landed(cells, *self._entering(by, suns, part, self.points), part, count)
         return flux
 
     def _entering(
@@ -205,7 +219,7 @@ class Beam:
         local = inside.to_group(self.group, to_sun)
         start = mi.Point3f(position + inside.outward(opaque(self.group, mi.Int32), mi.Bool(True)))
         reaching = by.transmittance(mi.Ray3f(start, to_sun), local.z > 0)
-        value = dr.select(local.z > 0, local.z * self.scattering.through(local) * reaching, 0.0)
+        value = dr.select(local.z > 0, local.z * reaching, 0.0)
         value *= opaque(inside.groups[self.group].area / points)
         return value.numpy().reshape(len(columns), points), position, to_sun
 
@@ -230,6 +244,36 @@ class Beam:
         cell = cell[kept]
         entries = flat[kept].astype(float), (cell, columns[kept // value.shape[1]])
         return sparse.csr_array(sparse.coo_array(entries, shape=(cells.size, count)))
+
+
+@dataclass(frozen=True, slots=True)
+class Beam:
+    """The straight beam of the sun through a window group with a system in it."""
+
+    scenes: tuple[TracedScene, TracedScene]  # as of `OpenBeam`
+    group: int
+    scattering: Scattering
+    points: int = POINTS
+    seeds: tuple[int, ...] = (0,)
+
+    def flux(self, cells: RoomCells, suns: NDArray[np.float64]) -> sparse.csr_array:
+        """Luminous flux on the cells [c, B * h], per unit illuminance normal to the sun [m2].
+
+        Args: suns: [h, 3] directions.
+        """
+        open_beam = OpenBeam(self.scenes, self.group, self.points, self.seeds)
+        tau = open_beam.transmittance(self.scattering, suns)
+        return transmitted(open_beam.flux(cells, suns, tau > 0), tau)
+
+
+def transmitted(flux: Sequence[sparse.csr_array], tau: NDArray[np.float32]) -> sparse.csr_array:
+    """The flux [c, B * h] of all paths [N][c, B * h], each times its transmittance [N, h]."""
+    whole = sparse.csr_array(flux[0].shape)
+    for one, by_hour in zip(flux, tau, strict=True):
+        if one.nnz and by_hour.any():
+            times = np.tile(by_hour.astype(float), one.shape[1] // max(len(by_hour), 1))
+            whole = whole + one @ sparse.diags_array(times)
+    return sparse.csr_array(whole)
 
 
 @cache

@@ -161,6 +161,37 @@ def room_light(
     return [(share @ part) * strength for share, part in zip(shares, parts, strict=True)]
 
 
+@dataclass(frozen=True, slots=True)
+class OpenBeamLight:
+    """Illuminance of sensors by what the room reflects of the sun's beam through an open window group, by a path."""
+
+    hours: NDArray[np.int64]  # [n] of the suns h, those by which some sensor is lit
+    light: NDArray[np.float32]  # [B, S, n] per illuminance normal to the sun
+
+    @classmethod
+    def of(cls, shares: Sequence[NDArray[np.float64]], flux: sparse.csr_array) -> OpenBeamLight:
+        """From the light per flux on each cell [B][S, c] and the flux [c, B * h]."""
+        count = flux.shape[1] // len(shares)
+        parts = [sparse.csc_array(flux[:, b * count : (b + 1) * count]) for b in range(len(shares))]
+        hours = np.flatnonzero(np.any([np.diff(part.indptr) > 0 for part in parts], axis=0))
+        light = [share @ part[:, hours] for share, part in zip(shares, parts, strict=True)]
+        return cls(hours, np.stack(light).astype(np.float32))
+
+
+def beam_light(
+    by_path: Sequence[OpenBeamLight], tau: NDArray[np.float32], strength: NDArray[np.float64]
+) -> list[NDArray[np.float64]]:
+    """The same of a system's straight beam, the paths together [B][S, h] [lx].
+
+    Args: tau: [N, h] of `OpenBeam.transmittance`; strength: [h] illuminance normal to the sun.
+    """
+    batches, sensors = by_path[0].light.shape[:2]
+    whole = np.zeros((batches, sensors, len(strength)))
+    for one, by_hour in zip(by_path, tau, strict=True):
+        whole[..., one.hours] += one.light * (by_hour * strength)[one.hours]
+    return list(whole)
+
+
 def _reflected(
     cells: RoomCells,
     inside: TracedScene,
