@@ -162,7 +162,8 @@ def peak_note(system: FenestrationSystem) -> tuple[str, ...]:
             "{system}: the transmission peak ({peak:.2f} at normal incidence) is a lobe, as it "
             "spreads into the neighbouring Klems patches: no sun or view passes straight on. In "
             "patches it is wider: DGP is up to {error:.2f} too low where the sun is seen through "
-            "it. If it is specular: see_through = 'specular' in its table, or --see-through {file}=specular of cfs run.",
+            "it. If it is specular: see_through = 'specular' in its table, or --see-through "
+            "{file}=specular of cfs run.",
             error=max(spread_sun_dgp(HIDDEN) - spread_sun_dgp((widest / 2 / np.pi) ** 0.5), 0.0),
             **values,
         )
