@@ -1,7 +1,8 @@
 """A folder of results: known by what it holds, replaced when all is written, nothing else touched.
 
-The mark of a folder, `cfs-results.json`, names this program, the command and every file that it
-wrote. Only those are ever replaced or removed.
+The mark of a folder, `cfs-results.json`, names this program, the command, its inputs and every file
+that it wrote. Only those are ever replaced or removed; by a command, only by results of the same
+inputs or where `--replace` asks for it.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ class FolderMark:
     command: str
     files: tuple[str, ...] = ()  # relative, with forward slashes
     removed: tuple[str, ...] = ()  # of finished results: earlier files that go for them
+    inputs: tuple[str, ...] = ()  # files, relative to the folder, and names of rules; empty: not recorded
 
     @classmethod
     def read(cls, folder: Path) -> FolderMark | None:
@@ -41,9 +43,10 @@ class FolderMark:
         try:
             record = json.loads((folder / MARK).read_text(encoding="utf-8"))
             known = record["program"] == PROGRAM and record["format"] == FORMAT
-            names = (tuple(map(str, record[key])) for key in ("files", "removed"))
+            files, removed = (tuple(map(str, record[key])) for key in ("files", "removed"))
             command = str(record["command"])
-            mark = cls(RENAMED.get(command, command), *names)
+            inputs = tuple(map(str, record.get("inputs", ())))  # marks of earlier versions have none
+            mark = cls(RENAMED.get(command, command), files, removed, inputs)
         except (OSError, ValueError, KeyError, TypeError, RecursionError):
             return None
         return mark if known and all(map(_inside, mark.files + mark.removed)) else None
@@ -57,6 +60,7 @@ class FolderMark:
             "command": self.command,
             "files": sorted(self.files),
             "removed": sorted(self.removed),
+            "inputs": sorted(self.inputs),
         }
         write_text(folder / MARK, json_text(record, indent=1, ensure_ascii=False) + "\n")
 
@@ -73,6 +77,8 @@ class ResultFolder:
         command: str,
         *,
         inputs: Iterable[Path | None] = (),
+        rules: Iterable[str] = (),
+        replacing: bool = True,
         adding: bool = False,
         among: bool = False,
         field: str = "--out",
@@ -82,6 +88,8 @@ class ResultFolder:
         Args:
             command: that writes; a folder of another command is refused.
             inputs: files of the command; the folder may not be or contain one.
+            rules: names of the rules of a check, inputs too.
+            replacing: earlier results of other inputs are replaced, not refused.
             adding: earlier results stay.
             among: the folder may hold files of others from the start.
             field: the option that named the folder.
@@ -91,14 +99,18 @@ class ResultFolder:
         self.folder, self._command, self._field = folder, command, field
         self._adding, self._among = adding, among
         self._place = Path(os.path.realpath(folder))
+        files = [one for one in inputs if one is not None]
+        self._inputs = tuple(sorted({*(_relative(one, self._place) for one in files), *rules}))
         if not adding:
-            self._refuse_inputs(inputs)
+            self._refuse_inputs(files)
         if self._place.exists() and not self._place.is_dir():
             raise self._error("is a file; results need a folder")
         try:
             self._take()
             self._finish_cut_off()
             self._mark = self._own_mark()
+            if not replacing:
+                self._refuse_other_inputs()
             self._try_to_write()
         except OSError as error:
             raise self._error(f"cannot be written: {reason(error)}") from error
@@ -134,7 +146,7 @@ class ResultFolder:
             earlier = set(filter(gone, earlier))
         elif self._adding:
             earlier = set()
-        FolderMark(self._command, files, tuple(earlier)).write(part)
+        FolderMark(self._command, files, tuple(earlier), self._inputs).write(part)
 
     def checkpoints(self, name: str) -> Path:
         """A folder inside for checkpoints of the command; it is never cleared."""
@@ -171,13 +183,25 @@ class ResultFolder:
             _remove_empty(made)
             raise self._error(f"cannot be written: {reason(error)}") from error
 
-    def _refuse_inputs(self, inputs: Iterable[Path | None]) -> None:
+    def _refuse_inputs(self, inputs: Iterable[Path]) -> None:
         here = Path(os.path.realpath(os.curdir))
         if here.is_relative_to(self._place):
             raise self._error("is or contains the current folder: name one for results alone")
         for one in inputs:
-            if one is not None and Path(os.path.realpath(one)).is_relative_to(self._place):
+            if Path(os.path.realpath(one)).is_relative_to(self._place):
                 raise self._error(f"is or contains the input {one}: name a folder for results alone")
+
+    def _refuse_other_inputs(self) -> None:
+        """Raise `DataError` where the folder has results of other inputs, which would be lost."""
+        earlier, now = set(self._mark.inputs), set(self._inputs)
+        if not earlier or earlier == now or not self._mark.files:
+            return
+        gone, new = _names(earlier - now, now - earlier)
+        if gone and new:
+            what = f"of {gone}, not of {new}"
+        else:
+            what = f"with {gone}" if gone else f"without {new}"
+        raise self._error(f"holds results {what}: name another folder, or add --replace to replace them")
 
     def _take(self) -> None:
         """Have the folder for this process, as long as this object exists."""
@@ -230,7 +254,7 @@ class ResultFolder:
             (part / name).replace(self._place / name)
         _remove(self._place, old.intersection(done.removed))
         files = old.difference(done.removed).union(done.files)
-        self._mark = FolderMark(done.command, tuple(files))
+        self._mark = FolderMark(done.command, tuple(files), inputs=done.inputs)
         self._mark.write(self._place)
 
     def _set_aside(self, part: Path, name: str) -> None:
@@ -294,6 +318,23 @@ def _inside(name: str) -> bool:
     """Whether a name of a mark stays inside its folder."""
     path = PurePosixPath(name)
     return bool(name) and not path.is_absolute() and ".." not in path.parts and "\\" not in name
+
+
+def _relative(file: Path, folder: Path) -> str:
+    """A file as seen from a folder, so that both may be moved together."""
+    place = os.path.realpath(file)
+    try:
+        return Path(os.path.relpath(place, folder)).as_posix()
+    except ValueError:  # on another drive
+        return Path(place).as_posix()
+
+
+def _names(*groups: Iterable[str]) -> tuple[str, ...]:
+    """Groups of inputs in words: the names of the files, with their folders where groups share a name."""
+    names = [[PurePosixPath(one).name for one in group] for group in groups]
+    if set.intersection(*map(set, names)):
+        names = [list(group) for group in groups]
+    return tuple(", ".join(sorted(group)) for group in names)
 
 
 def _files(folder: Path) -> Iterator[str]:

@@ -88,19 +88,19 @@ def computations(project: Project, wanted: Mapping[str, Any]) -> list[Action]:
             command += ["--annual-glare"] if wanted.get("annual_glare") else []
             command += ["--explore"] if wanted.get("explore") else []
             out = f"{RESULTS}/report-{name}"
-            actions.append(Action("run", _name(system), (*command, *titled, *pages, "--out", out), out))
+            actions.append(Action("run", _name(system), (*command, *titled, *pages, "--out", out, "--replace"), out))
         if standards:
             command = ["comply", *shared, *_states(project, system), *_options(study)]
             command += [part for one in standards for part in ("--standard", one)]
             command += ["--annual-glare"] if wanted.get("annual_glare") else []
             command += ["--uses", USES] if (project.folder / USES).is_file() else []
             out = f"{RESULTS}/rules-{name}"
-            actions.append(Action("comply", _name(system), (*command, *titled, *pages, "--out", out), out))
+            actions.append(Action("comply", _name(system), (*command, *titled, *pages, "--out", out, "--replace"), out))
     if wanted.get("compare"):
         _weather(study)
         _files(project)
         out = f"{RESULTS}/comparison"
-        actions.append(Action("study", "", ("study", STUDY, *pages, "--out", out), out))
+        actions.append(Action("study", "", ("study", STUDY, *pages, "--out", out, "--replace"), out))
     return actions
 
 

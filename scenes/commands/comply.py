@@ -20,6 +20,7 @@ from scenes.commands.room_options import (
     grid_option,
     input_options,
     named_settings,
+    replacing,
     room_options,
     stated_options,
     taken,
@@ -132,7 +133,9 @@ def command(
     inputs = (building, options.weather, options.system, options.closed, options.operation)
     inputs += (options.uses, options.lamps)
     inputs += (*options.linked, *options.surroundings, *page_options.inputs)
-    folder = ResultFolder(out, "comply", inputs=inputs)
+    rules = [name for name in options.standards if name[-5:] != ".toml"]
+    inputs += tuple(Path(name) for name in options.standards if name[-5:] == ".toml")
+    folder = ResultFolder(out, "comply", inputs=inputs, rules=rules, replacing=replacing())
     if write_ifc is not None:
         check_is_ifc(building, "--write-ifc")
         check_file(write_ifc, field="--write-ifc", inputs=(building,))

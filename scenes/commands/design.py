@@ -13,9 +13,10 @@ from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import (
     FILE,
     chosen_language,
-    out_folder_option,
     page_option,
     processes_option,
+    replacing,
+    results_folder_option,
     scheduler_option,
 )
 
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 @click.command(cls=StrictCommand)
 @click.argument("design", type=FILE, metavar="DESIGN.toml")
-@out_folder_option
+@results_folder_option
 @processes_option(1, "1 by default, because candidates depend on those computed beside them")
 @scheduler_option
 @page_option
@@ -82,7 +83,7 @@ def _checked(files: tuple[Path, ...], parsed: Design, out: Path, scheduler: str 
     from scenes.study.store import Store
     from scenes.workers import check_dask
 
-    store = Store(out, inputs=files, command="design")
+    store = Store(out, inputs=files, command="design", replacing=replacing())
     default_folder()  # of the cache, or one line that it cannot be one
     if scheduler is not None:
         check_dask()

@@ -17,9 +17,10 @@ from scenes.commands.room_options import (
     input_options,
     light_options,
     method_option,
-    out_folder_option,
     page_option,
     quick_option,
+    replacing,
+    results_folder_option,
     samples_option,
     size_option,
     stated_options,
@@ -34,7 +35,7 @@ _DEFAULT = YearOptions(Path(), Path())
 
 @click.command(cls=StrictCommand)
 @input_options("the first with a window", several=False, weather="demo")
-@out_folder_option
+@results_folder_option
 @view_option("views", "or a file of views", several=True)
 @grid_option
 @directions_option
@@ -102,7 +103,7 @@ def command(out: Path, page: Path | None, **chosen) -> None:
     named = (chosen["building"], chosen["weather"], chosen["system"])
     files = (*named, *map(Path, chosen["views"]), *chosen["linked"], *chosen["surroundings"], *page_options.inputs)
     options = YearOptions(**with_demo(chosen))
-    folder = ResultFolder(out, "dgp", inputs=files)
+    folder = ResultFolder(out, "dgp", inputs=files, replacing=replacing())
     read = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar
     from scenes.language.catalogue import in_language, ngettext

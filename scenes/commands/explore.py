@@ -10,6 +10,7 @@ import click
 
 from mitsuba_cfs.files import read_json, scratch_folder
 from scenes.commands.examples import StrictCommand
+from scenes.commands.room_options import replace_option, replacing
 from scenes.commands.served_page import port_fault, served_page_options
 
 RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
@@ -18,6 +19,7 @@ RESULTS = click.Path(exists=True, file_okay=False, path_type=Path)
 @click.command(cls=StrictCommand)
 @click.argument("results", type=RESULTS, nargs=-1, required=True, metavar="RESULTS...")
 @click.option("--out", type=click.Path(path_type=Path), help="Write one folder that opens as a file, and exit.")
+@replace_option
 @served_page_options("results of a run state none")
 def command(results: Sequence[Path], out: Path | None, port: int, language: str, no_browser: bool) -> None:
     """Show any hour of a run: pictures, glare, plans with sunlit areas, temperatures.
@@ -33,7 +35,8 @@ def command(results: Sequence[Path], out: Path | None, port: int, language: str,
     for one in results:
         _print_head(one, several=len(results) > 1)
     if out is not None:
-        with in_language(language), ResultFolder(out, "explore", inputs=results).replaced() as place:
+        folder = ResultFolder(out, "explore", inputs=results, replacing=replacing())
+        with in_language(language), folder.replaced() as place:
             join_explorers(results, place)
         click.echo(f"explorer: {out / 'index.html'}")
         return

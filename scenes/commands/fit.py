@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from scenes.commands.examples import StrictCommand
-from scenes.commands.room_options import FILE, chosen_language, out_folder_option, page_option
+from scenes.commands.room_options import FILE, chosen_language, page_option, replacing, results_folder_option
 
 if TYPE_CHECKING:
     from scenes.fit.fit import FitResult
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @click.command(cls=StrictCommand)
 @click.argument("fit", type=FILE, metavar="FIT.toml")
-@out_folder_option
+@results_folder_option
 @page_option
 def command(fit: Path, *, out: Path, page: Path | None) -> None:
     """Fit inputs of a model to measured illuminance, luminance or temperatures.
@@ -30,7 +30,7 @@ def command(fit: Path, *, out: Path, page: Path | None) -> None:
 
     parsed = read_fit(fit)
     page_options = read_page(page, FitSection, chosen_language())
-    folder = ResultFolder(out, "fit", inputs=(fit, *parsed.files, *page_options.inputs))
+    folder = ResultFolder(out, "fit", inputs=(fit, *parsed.files, *page_options.inputs), replacing=replacing())
     from scenes.commands.progress_bar import ProgressBar, compiled_beside
     from scenes.fit.fit import FITTED_STUDY, run_fit, write_fit
     from scenes.fit.page import write_fit_report

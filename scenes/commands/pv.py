@@ -15,8 +15,9 @@ from scenes.commands.room_options import (
     PrintedHead,
     input_options,
     no_cache_option,
-    out_folder_option,
     quick_option,
+    replacing,
+    results_folder_option,
     seed_option,
 )
 from scenes.input_options import InputOptions
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 @click.command(cls=StrictCommand)
 @input_options("", system=False, glazing=False)
 @click.option("--study", "study_file", required=True, type=FILE, help="TOML file of the system; see docs/pv.md.")
-@out_folder_option
+@results_folder_option
 @seed_option
 @no_cache_option
 @quick_option
@@ -49,7 +50,8 @@ def command(study_file: Path, out: Path, seed: int, **chosen) -> None:
     options = InputOptions(**chosen)
     building, weather, quick = options.building, options.weather, options.quick
     files = read_files(options, hourly=False)
-    folder = ResultFolder(out, "pv", inputs=(building, *options.linked, weather, study_file))
+    inputs = (building, *options.linked, weather, study_file)
+    folder = ResultFolder(out, "pv", inputs=inputs, replacing=replacing())
     # all that is small is read: what is heavy is loaded now
     from mitsuba_cfs import variants
     from mitsuba_cfs.matrices.cache import MatrixCache

@@ -95,8 +95,28 @@ Study = TypeVar("Study", "StudyFile", "Grid")
 Option = Callable[[Callable], Callable]
 _GRID = SensorGrid()
 LANGUAGE = "cfs.language"  # where `--language` is kept of a call
+REPLACE = "cfs.replace"  # where `--replace` is kept of a call
 
 out_folder_option = click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder of results.")
+replace_option = click.option(
+    "--replace",
+    is_flag=True,
+    expose_value=False,
+    callback=lambda context, _, value: context.meta.update({REPLACE: value}),
+    help="Replace earlier results of other inputs in --out; without it they are kept, and the command ends.",
+)
+
+
+def results_folder_option(command: Callable) -> Callable:
+    """`--out` of a folder of results of some inputs, with `--replace`."""
+    return out_folder_option(replace_option(command))
+
+
+def replacing() -> bool:
+    """Whether the command under way may replace results of other inputs."""
+    return click.get_current_context().meta.get(REPLACE, False)
+
+
 join_option = click.option(
     "--join",
     multiple=True,
@@ -439,7 +459,7 @@ def light_options(command: Callable) -> Callable:
 def room_options(command: Callable) -> Callable:
     """The options that `cfs run` and `cfs comply` share beside the inputs."""
     return _all_of(
-        out_folder_option,
+        results_folder_option,
         annual_glare_option,
         subdivide_option,
         light_options,

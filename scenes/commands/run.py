@@ -25,6 +25,7 @@ from scenes.commands.room_options import (
     method_option,
     named_settings,
     processes_option,
+    replacing,
     room_options,
     scheduler_option,
     sensitivities_option,
@@ -176,7 +177,7 @@ def run_to_folder(
     page_options = read_page(page, RunSection, chosen_language())
     inputs = (options.building, options.weather, options.system, options.operation)
     inputs += (*options.linked, *options.surroundings, *page_options.inputs)
-    folder = ResultFolder(out, "run", inputs=inputs)
+    folder = ResultFolder(out, "run", inputs=inputs, replacing=replacing())
     if options.cache:
         default_folder()  # or one line that it cannot be one
     files = read_files(options)  # before anything heavy is loaded

@@ -10,7 +10,14 @@ import click
 
 from mitsuba_cfs.files import json_text, write_table, write_text
 from scenes.commands.examples import CommandGroup
-from scenes.commands.room_options import FILE, PrintedHead, input_options, no_cache_option, out_folder_option
+from scenes.commands.room_options import (
+    FILE,
+    PrintedHead,
+    input_options,
+    no_cache_option,
+    replacing,
+    results_folder_option,
+)
 from scenes.input_options import InputOptions
 
 if TYPE_CHECKING:
@@ -43,7 +50,7 @@ def command() -> None:
     help="Height of the work plane above the floor [m]; of the no-sky line.",
 )
 @no_cache_option
-@out_folder_option
+@results_folder_option
 def neighbours(proposed: tuple[Path, ...], height: float, out: Path, **chosen: Any) -> None:
     """Daylight and sun that the windows of BUILDING lose by a proposed neighbour (BRE's BR 209).
 
@@ -91,7 +98,7 @@ def neighbours(proposed: tuple[Path, ...], height: float, out: Path, **chosen: A
     help="Visible reflectance of the glass at normal incidence, outdoors; 0.15: clear double glazing.",
 )
 @no_cache_option
-@out_folder_option
+@results_folder_option
 def reflections(points: Path, reflectance: float, out: Path, **chosen: Any) -> None:
     """Sun that the panes of BUILDING reflect to streets, rails and windows.
 
@@ -136,7 +143,8 @@ def _inputs(
 
     options = InputOptions(**chosen)
     read = read_files(options, hourly=False)
-    folder = ResultFolder(out, name, inputs=(options.building, *options.linked, options.weather, *files))
+    inputs = (options.building, *options.linked, options.weather, *files)
+    folder = ResultFolder(out, name, inputs=inputs, replacing=replacing())
     return options, read.weather, folder
 
 

@@ -19,10 +19,11 @@ from scenes.commands.room_options import (
     chosen_language,
     explore_option,
     method_option,
-    out_folder_option,
     page_option,
     processes_option,
     quick_option,
+    replacing,
+    results_folder_option,
     scheduler_option,
     surroundings_offset_option,
     surroundings_option,
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 
 @click.command(cls=StrictCommand)
 @click.argument("study", type=FILE, metavar="STUDY.toml")
-@out_folder_option
+@results_folder_option
 @processes_option(None, BY_MACHINE)
 @scheduler_option
 @method_option(["auto"], "auto: chosen by cost and error, instead of the file's")
@@ -183,7 +184,7 @@ def _checked(files: tuple[Path, ...], parsed: Study, out: Path, scheduler: str |
     from scenes.study.store import Store
     from scenes.workers import check_dask
 
-    store = Store(out, inputs=files)
+    store = Store(out, inputs=files, replacing=replacing())
     default_folder()  # of the cache, or one line that it cannot be one
     if write_ifc is not None:
         check_file(write_ifc, field="--write-ifc", inputs=parsed.files)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from scenes.commands.examples import StrictCommand
-from scenes.commands.room_options import FILE
+from scenes.commands.room_options import FILE, replacing
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 from scenes import quick as quick_run
 from scenes.commands.room_options import (
     PrintedHead,
-    out_folder_option,
     quick_option,
+    results_folder_option,
     surroundings_offset_option,
     surroundings_option,
     with_flags,
@@ -30,7 +30,7 @@ from scenes.commands.room_options import (
 
 @click.command(cls=StrictCommand)
 @click.argument("study", type=FILE, metavar="STUDY.toml")
-@out_folder_option
+@results_folder_option
 @click.option("--figures", is_flag=True, help="Write a figure of each room's year as SVG.")
 @click.option(
     "--energyplus", is_flag=True, help="Also write the rooms as EnergyPlus input (model.epJSON, schedules.csv)."
@@ -66,7 +66,7 @@ def command(
         *(one.bsdf for one in parsed.system if one.bsdf),
         *parsed.surroundings,
     )
-    folder = ResultFolder(out, "thermal", inputs=inputs)
+    folder = ResultFolder(out, "thermal", inputs=inputs, replacing=replacing())
     files = read_files(parsed, study)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar, compiled_beside
     from scenes.heat.study import run_study

@@ -55,13 +55,17 @@ class CaseResult:
 class Store:
     """A study's folder: each finished case is kept at once, tables and report come at the end."""
 
-    def __init__(self, folder: Path, *, inputs: Iterable[Path | None] = (), command: str = "study") -> None:
+    def __init__(
+        self, folder: Path, *, inputs: Iterable[Path | None] = (), command: str = "study", replacing: bool = True
+    ) -> None:
         """Raises: `DataError` for a folder that is not the command's or cannot be written to.
 
-        Args: inputs: the study's files; the folder may not be or contain one.
+        Args:
+            inputs: the study's files; the folder may not be or contain one.
+            replacing: earlier results of other files are replaced, not refused.
         """
         self.folder, self._command = folder, command
-        self._results = ResultFolder(folder, command, inputs=inputs)
+        self._results = ResultFolder(folder, command, inputs=inputs, replacing=replacing)
 
     def open(self) -> None:
         """Make the folder, for cases to be kept in."""

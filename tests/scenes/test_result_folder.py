@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -317,3 +318,35 @@ def test_results_are_removed_with_their_cases_and_files_of_others_stay(tmp_path)
     assert content(out) == {"a": "2", "mine": "mine"}
     with pytest.raises(DataError, match="is no folder of results"):
         remove_results(tmp_path)
+
+
+def test_results_of_other_inputs_are_replaced_only_where_asked_for(tmp_path: Path) -> None:
+    """A command replaces its results of the same inputs; those of another building or rule stay."""
+    out = tmp_path / "out"
+    house, other, again = tmp_path / "house.ifc", tmp_path / "other.ifc", tmp_path / "second" / "house.ifc"
+
+    def folder(*inputs: Path, rules: tuple[str, ...] = ("en17037",), replacing: bool = False) -> ResultFolder:
+        return ResultFolder(out, "test", inputs=[*inputs, None], rules=rules, replacing=replacing)
+
+    def write(results: ResultFolder, text: str) -> None:
+        with results.replaced() as place:
+            (place / "dossier").write_text(text)
+
+    folder(house).early({"plan": "begun"})  # a plan is no result
+    write(folder(other), "first")
+    write(folder(other), "second")
+    for call, words in (
+        (lambda: folder(house), "holds results of other.ifc, not of house.ifc"),
+        (lambda: folder(other, rules=("lm83",)), "holds results of en17037, not of lm83"),
+        (lambda: folder(other, house), "holds results without house.ifc"),
+        (lambda: folder(other, rules=()), "holds results with en17037"),
+    ):
+        with pytest.raises(DataError, match=words + ": name another folder, or add --replace"):
+            call()
+    assert (out / "dossier").read_text() == "second"
+    write(folder(house, replacing=True), "third")
+    with pytest.raises(DataError, match=r"of \.\./house.ifc, not of \.\./second/house.ifc"):
+        folder(again)
+    shutil.move(out, tmp_path / "moved" / "out")
+    out = tmp_path / "moved" / "out"
+    folder(tmp_path / "moved" / "house.ifc")  # moved with its inputs
