@@ -198,7 +198,7 @@ class Account:
         ]
         losses += [
             Note(
-                "storey {storey} has no rooms and {area:.1f} m2 of unused glass",
+                "{area:.1f} m2 of the unused glass in storey {storey}, which has no rooms",
                 storey=_storey(s.name),
                 area=s.glass_out - s.glass_used,
             )

@@ -525,7 +525,13 @@ UNREAD = {  # by suffix: what it is, and the file to give instead
     ".idf": "is an EnergyPlus input; give the building as gbXML or HBJSON",
     ".epjson": "is an EnergyPlus input; give the building as gbXML or HBJSON",
     ".osm": "is an OpenStudio model; export it as gbXML",
+    ".epw": "is a weather file: give it with --weather, and the building first",
+    ".wea": "is a weather file: give it with --weather, and the building first",
+    ".hdr": "is a picture: give it to cfs glare",
+    ".pic": "is a picture: give it to cfs glare",
+    ".toml": "is a TOML file: give the building first, and a study to cfs study, an operation with --operation",
     ".rvt": "is a Revit model; export it as IFC or gbXML",
+    "bsdf": "is a BSDF: give it with --cfs, and the building first",
     ".skp": "is a SketchUp model; export it as IFC, gbXML or HBJSON",
 }
 MARKS = (  # in the first bytes of a file of any suffix
@@ -534,6 +540,9 @@ MARKS = (  # in the first bytes of a file of any suffix
     (b":ifcXML", ".ifcxml"),
     (b"ISO_10303_28", ".ifcxml"),
     (b"dragonfly_version", ".dfjson"),
+    (b"#?RADIANCE\nFORMAT=32-bit", ".hdr"),
+    (b"LOCATION,", ".epw"),
+    (b"<WindowElement", "bsdf"),
 )
 IFC = BuildingFormat("IFC", (".ifc", ".ifczip", ".zip"), check_ifc, _read_ifc, ("join", "linked", "storeys"))
 RADIANCE = BuildingFormat("Radiance", (".rad",), _check_there, _read_radiance, ("apertures", "facade_panes"))

@@ -109,7 +109,8 @@ def item_named(items: Sequence[T], wanted: str, kind: str) -> T:
         labels = [item.label for item in matches]
         same = len(set(labels)) < len(labels)
         shown = (f"{item.label} ({item.guid})" if same else item.label for item in matches)
-        raise AmbiguousName(f"{len(matches)} {kind}s are named {wanted!r}: {listed(wanted, shown)}")
+        how = "give the GUID of one" if same else "give the whole name of one, in quotes"
+        raise AmbiguousName(f"{len(matches)} {kind}s are named {wanted!r}: {listed(wanted, shown)}; {how}")
     return matches[0]
 
 
@@ -131,6 +132,12 @@ def _names_of_parts(item: Named) -> set[str]:
     pairs = zip(names, long_names, strict=False) if len(names) == len(long_names) else ()
     labels = (label_of(name, long_name, "") for name, long_name in pairs)
     return {*names, *long_names, *labels} if len(names) > 1 else set()
+
+
+def natural_key(name: str) -> list[tuple[int, str]]:
+    """For sorting names as people do: their numbers by value, 2 before 10."""
+    parts = re.split(r"(\d+)", name.casefold())
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts if part]
 
 
 def _key(name: str) -> str:

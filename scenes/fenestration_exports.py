@@ -33,14 +33,20 @@ class KnownFenestration:
 
     def notes(self, without: str = "written without") -> tuple[str, ...]:
         """Where each window's optics come from, and which windows have none, as `without` says."""
+        further = f"{windows_named(self.several)}: only the first shading state is written."
+        return (*self.sources(), *self.missing(without), *([further] if self.several else []))
+
+    def sources(self) -> tuple[str, ...]:
+        """Where each window's optics come from."""
         filled = [window for window in self.windows if window.guid in self.systems]
-        states = {guid: (system,) for guid, system in self.systems.items()}
-        none = (
+        return source_notes(window_sources(filled, {guid: (system,) for guid, system in self.systems.items()}))
+
+    def missing(self, without: str) -> tuple[str, ...]:
+        """Which windows have no optics, and what follows, as `without` says."""
+        return tuple(
             f"{windows_named(names)}: no BSDF is attached {missing}: {without}."
             for missing, names in self.unfilled.items()
         )
-        further = f"{windows_named(self.several)}: only the first shading state is written."
-        return (*source_notes(window_sources(filled, states)), *none, *([further] if self.several else []))
 
     def glazings(self) -> tuple[dict[str, ExportedGlazing], tuple[str, ...]]:
         """Data of each window by GUID as a run uses them, and a sentence on each assumption.

@@ -307,14 +307,14 @@ def site_notes(building: Building, weather: Weather) -> tuple[str, ...]:
     note = Note(
         "The site of the building ({building}) is far from the weather station {station} ({position}); "
         "the solar positions are those of the weather station.",
-        building=_position(building.latitude_deg, building.longitude_deg),
+        building=position_words(building.latitude_deg, building.longitude_deg),
         station=weather.site,
-        position=_position(weather.latitude_deg, weather.longitude_deg),
+        position=position_words(weather.latitude_deg, weather.longitude_deg),
     )
     return (note,)
 
 
-def _position(latitude_deg: float, longitude_deg: float) -> Note:
+def position_words(latitude_deg: float, longitude_deg: float) -> Note:
     """Latitude and longitude in words."""
     north, east = abs(float(latitude_deg)), abs(float(longitude_deg))
     if latitude_deg >= 0 and longitude_deg >= 0:

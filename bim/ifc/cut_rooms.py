@@ -24,7 +24,7 @@ from bim.ifc.source import Source
 from bim.ifc.spaces import SpaceRecord
 from bim.isolated_solids import parted
 from bim.rays import RayMesh, ray_mesh
-from bim.report.issue import Issue
+from bim.report.issue import Issue, Phrase
 from bim.rooms import RoomSolid, room_solid
 from bim.solids import packed, unpacked
 from mitsuba_cfs.processes import ProcessEnded
@@ -35,6 +35,8 @@ TOUCHING = 1e-9  # a lid beside a space that overlaps it by less does not cover 
 MOSTLY = 0.7  # share of the top of a space that has to lie beyond what cuts it
 PARTLY = 0.05  # and from which the room may be one under a pitched roof
 OPEN = 0.7  # share of the top of a part under the open sky from which it is outdoors
+LEAST_SHOWN = 0.005  # a height that is less is 0.00 m in words [m]
+LEVEL = 0.99  # z of the normal of a level face
 LEAST_CUT = 0.02  # share of the volume: less is the drawing's
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -70,17 +72,21 @@ def cut_rooms(
         after = solid.manifold.volume()
         if after > (1 - LEAST_CUT) * record.volume:
             continue
-        top, low = float(solid.high[2]), float(solid.low[2])
-        values = {
-            "room": record.label,
-            "before": record.volume,
-            "after": after,
-            "top": float(record.solid.high[2]) - top,
-            "bottom": low - float(record.solid.low[2]),
-        }
+        values = {"room": record.label, "before": record.volume, "after": after, "beyond": _beyond(record.solid, solid)}
         issues.append(Issue("room-cut", record.guid, values))
         result[index] = replace(record, solid=solid, volume=after, cut=record.volume - after)
     return result, issues
+
+
+def _beyond(drawn: RoomSolid, cut: RoomSolid) -> Phrase:
+    """Where a space goes beyond what ends the room, in words."""
+    top, bottom = float(drawn.high[2] - cut.high[2]), float(cut.low[2] - drawn.low[2])
+    over, under = top >= LEAST_SHOWN, bottom >= LEAST_SHOWN
+    if over or under:
+        key = "beyond-both" if over and under else "beyond-cover" if over else "beyond-floor"
+        return Phrase(key, {"top": top, "bottom": bottom})
+    sloping = any(LEAST_SHOWN < facet.plane.normal[2] < LEVEL for facet in cut.facets)
+    return Phrase("beyond-slope" if sloping else "beyond-part")
 
 
 def goes_through(record: SpaceRecord, lids: Sequence[Shape], boxes: Boxes) -> bool:

@@ -168,6 +168,10 @@ def _unit_scale(model: ifcopenshell.file, kind: str, damage: Damage) -> float:
     )
 
 
+DEFAULT_SITES = {"Archicad": (24.467, 54.417), "Revit": (42.359, -71.057)}  # latitude, longitude [deg]
+SAME_SITE_DEG = 0.005
+
+
 def site_location(model: ifcopenshell.file) -> tuple[float | None, float | None, float, list[Issue]]:
     """Latitude and longitude (east positive) [deg], elevation [m], and what is wrong with them."""
     for site in model.by_type("IfcSite"):
@@ -180,7 +184,12 @@ def site_location(model: ifcopenshell.file) -> tuple[float | None, float | None,
             return None, None, elevation, [Issue("site-not-on-earth", site.GlobalId, values)]
         if latitude == 0 and longitude == 0:
             return None, None, elevation, [Issue("site-at-zero", site.GlobalId)]
-        return latitude, longitude, elevation, []
+        issues = [
+            Issue("site-of-exporter", site.GlobalId, {"latitude": latitude, "longitude": longitude, "program": program})
+            for program, place in DEFAULT_SITES.items()
+            if max(abs(latitude - place[0]), abs(longitude - place[1])) < SAME_SITE_DEG
+        ]
+        return latitude, longitude, elevation, issues
     return None, None, 0.0, [Issue("site-without-position", "IfcSite")]
 
 

@@ -11,6 +11,7 @@ import click
 
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import check_file, write_table, write_text
+from mitsuba_cfs.notes import Note
 from scenes.commands.examples import StrictCommand
 from scenes.commands.room_options import check_is_ifc, input_options, no_cache_option
 from scenes.input_options import InputOptions
@@ -99,9 +100,11 @@ def command(
     known = known_fenestration(spaces, options.building)
     # a file or a program that reads on gets every line whole, however long
     console = Console(width=None if Console().is_terminal else UNCUT)
-    of_model = head_of(read, light_only=True)
-    head = of_model.with_assumptions(known.notes("a run needs a system for them: --cfs, or step 3 of cfs app"))
-    lines = (*head.model, *(f"assumed: {text}" for text in head.assumed))
+    missing = known.missing("a run needs --glazing NAME, --cfs FILE, or step 3 of cfs app")
+    head = head_of(read, light_only=True)
+    known_words = known.sources()
+    stated = (*head.model, *_site(read), *(f"assumed: {text}" for text in head.assumed))
+    lines = (*stated, *(f"glazing: {text}" for text in known_words), *(f"missing: {text}" for text in missing))
     for line in lines:
         console.print(line, markup=False, highlight=False)
     console.print(_rooms(read.name, spaces))
@@ -128,7 +131,7 @@ def command(
 
         with ProgressBar() as progress:
             before = _uncorrected(options, progress)
-        write_check(read, head.model, html, before)
+        write_check(read, (*head.model, *_site(read)), html, before)
         console.print(f"page: {html}", markup=False, highlight=False)
     if record is not None:
         from mitsuba_cfs.files import json_text
@@ -138,7 +141,6 @@ def command(
 
         uses = uses_of_rooms(read, read.spaces, read_uses(), options.linked)
         facts = {guid: (use.key, str(use.source), use.assumed) for guid, use in uses.items()}
-        stated = (*of_model.model, *(f"assumed: {text}" for text in of_model.assumed))  # windows state their glazing
         data = check_record(read, stated, facts, glazing_data(read.spaces, options.building))
         write_text(record, json_text(data, ensure_ascii=False) + "\n")
         console.print(f"data: {record}", markup=False, highlight=False)
@@ -149,6 +151,14 @@ def command(
 
         rows = issue_rows(read.issues, "command")
         write_table(pd.DataFrame(rows, columns=list(COLUMNS)), issues, index=False)
+
+
+def _site(building: Building) -> Iterator[str]:
+    """The position of the site, which many exporters leave at a default."""
+    from scenes.head import position_words
+
+    if building.latitude_deg is not None and building.longitude_deg is not None:
+        yield Note("Site: {position}", position=position_words(building.latitude_deg, building.longitude_deg))
 
 
 def _uncorrected(options: InputOptions, progress: Progress) -> Building | None:
@@ -171,24 +181,33 @@ def _rooms(building: str, spaces: Sequence[Space]) -> Table:
     """One line for each room, drawn figures beside those that the file states."""
     from rich.table import Table
 
+    from bim.names import natural_key
+
     table = Table(title=f"Rooms of {building}", title_justify="left")
     table.add_column("room", overflow="fold")
     table.add_column("storey", overflow="fold")
     for head in ("floor m2", "stated", "volume m3", "stated", "faces", "windows", "glass m2"):
         table.add_column(head, justify="right")
-    for space in spaces:
+    for space in sorted(spaces, key=lambda space: natural_key(space.label)):
         table.add_row(
             space.label,
             space.storey,
             f"{space.floor_area:.2f}",
             _number(space.stated_area),
-            f"{space.drawn_volume:.2f}",
+            _volume(space),
             _number(space.stated_volume),
             str(len(space.faces)),
             str(len(space.windows)),
             f"{sum(w.area for w in space.windows):.2f}",
         )
     return table
+
+
+def _volume(space: Space) -> str:
+    """The volume of the room, and that of the space as drawn where it was cut or raised."""
+    if space.cut or space.raised:
+        return f"{space.room_volume:.2f} (drawn {space.drawn_volume:.2f})"
+    return f"{space.room_volume:.2f}"
 
 
 def _number(value: float | None) -> str:

@@ -155,7 +155,7 @@ def command(
         write_compliance(result, folder, quick=quick, page=page_options)
     for title, sentence in answers(result):
         click.echo(f"{title}: {sentence}")
-    head.notes((*result.assumptions, *result.notes))
+    head.notes((*result.assumptions, *result.notes, *result.settings))
     click.echo(f"dossier: {out / 'dossier.html'}")
     if write_ifc is not None:
         for issue in write_into_ifc(result, write_ifc):

@@ -38,7 +38,7 @@ from scenes.comply.findings import EyeLight, Findings, GridLight, RoomHeat, Seat
 from scenes.comply.glare import PICTURED, seat_glare, worst_seat_glare
 from scenes.comply.needs import DgpExceeded
 from scenes.comply.options import ComplyOptions
-from scenes.comply.outdoors import OutdoorMesh, outdoors_of
+from scenes.comply.outdoors import OutdoorMesh, has_surroundings, outdoors_of
 from scenes.comply.results import CheckedRoom, Compliance, GridSummary, RoomLights
 from scenes.comply.rules import GridTable
 from scenes.comply.sunlight import SunExposure, sun_day, sun_exposure
@@ -80,20 +80,23 @@ from thermal.ratings import CLASSES, ThermalRating
 STANDARD = "ISO 52022-3, reference"  # the method that is named where a system's layers are known
 
 
-def solar_sentences(systems: Mapping[str, States]) -> Iterator[str]:
-    """Of each state of the windows' systems: g_tot at normal incidence and EN 14501's class.
+def solar_sentences(systems: Mapping[str, States]) -> tuple[list[str], list[str]]:
+    """Of each state of the windows' systems g_tot and EN 14501's class; what is assumed of their heat.
 
     LM-83's default shade is a figure for light alone: it has no heat to be rated.
     """
     distinct = {id(state): state for states in systems.values() for state in states}
+    ratings: list[str] = []
+    assumed: list[str] = []
     for system in distinct.values():
         if DEFAULT_NAME in system.name:
             continue
         try:
-            yield solar_sentence(system)
-            yield from thermal_system(system).notes
+            ratings.append(solar_sentence(system))
+            assumed += thermal_system(system).notes
         except ThermalInputError as error:
-            yield Note("{system}: g_tot is unknown: {reason}.", system=system.name, reason=error.message)
+            ratings.append(Note("{system}: g_tot is unknown: {reason}.", system=system.name, reason=error.message))
+    return ratings, assumed
 
 
 def solar_sentence(system: FenestrationSystem) -> str:
@@ -279,6 +282,7 @@ def check_rooms(
         (*check.head.issues, *view_issues, *issues),
         check.seconds,
         blinds=check.blinds,
+        settings=(*([light_words(options.room)] if check.lit else []), *dict.fromkeys(check.ratings)),
     )
 
 
@@ -300,8 +304,8 @@ class Check:
             check_states(self.operation, max(map(len, self.inputs.filled.values()), default=1))
         self.systems, self.building = self.inputs.systems, self.inputs.building
         self.shaded = self._shaded(self.inputs.filled)
-        extra = [*unused_notes(building), *solar_sentences(self.systems)]
-        self.head = self.inputs.head.with_assumptions(extra)
+        self.ratings, extra = solar_sentences(self.systems)
+        self.head = self.inputs.head.with_assumptions([*unused_notes(building), *extra])
         windows = [window for space in self.inputs.spaces for window in space.windows]
         self.hidden, self.glass = windows_without_view(windows, self.systems)
         self.calendar = calendar_of(files.weather)
@@ -617,6 +621,11 @@ class Check:
     def _ray_words(self) -> Iterator[str]:
         """What was assumed for sun and view."""
         files, options = self.files, self.options
+        if not options.surroundings and not has_surroundings(self.building):
+            yield Note(
+                "The model has no surroundings (neighbouring buildings, trees): daylight, view out and sunlight are "
+                "those of a free horizon; --surroundings adds them."
+            )
         if "sun" in self.parts:
             month, day = options.day
             yield Note(
@@ -646,8 +655,6 @@ class Check:
             yield Note("Glare was not computed; --annual-glare rates every hour with daylight.")
         elif self.glaring:
             yield glare_words(self.options, self.blinds)
-        if self.lit:
-            yield light_words(room)
         if "eye" in self.parts:
             yield eye_words(self.options, self.blinds)
             yield from dict.fromkeys(self.eye_notes)

@@ -13,7 +13,7 @@ from scenes.comply.options import OTHER_ALTITUDE_DEG, ComplyOptions
 from scenes.comply.rules import RuleTable, read_rule, rule_named
 from scenes.comply.uses import RoomUses, read_uses
 from scenes.fenestration.systems import FenestrationSystem, read_system
-from scenes.input_files import InputFiles, check_building
+from scenes.input_files import InputFiles
 from scenes.input_files import read_files as read_inputs
 from scenes.room.operation import Operation, read_operation
 
@@ -43,7 +43,6 @@ def read_files(options: ComplyOptions) -> ComplyFiles:
     """
     if options.building is None or options.weather is None:
         raise ValueError("a check of files needs a building and a weather")
-    check_building(options)
     if options.operation is not None and options.closed is not None:
         raise DataError("the operation file has the closed state: its last [[system]]", field="--closed")
     rules = {
@@ -51,7 +50,7 @@ def read_files(options: ComplyOptions) -> ComplyFiles:
     }
     if not rules:
         raise DataError("expected at least one rule", field="--standard")
-    inputs = read_inputs(options, light_only=True)
+    inputs = read_inputs(options, light_only=True)  # checks the building too
     rules = {name: rule.of_weather(inputs.weather) for name, rule in rules.items()}
     _check_weather(rules, inputs.weather)
     altitude, source = least_altitude(options, rules, inputs.weather)

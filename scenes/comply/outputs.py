@@ -15,12 +15,14 @@ from markupsafe import Markup
 
 from bim.bcf import Topic, in_model, write_topics
 from bim.building_file import is_ifc
+from bim.names import natural_key
 from bim.report.issue import COLUMNS, Issue, issue_rows
 from bim.sensors import view_point
 from mitsuba_cfs.errors import RoomError
 from mitsuba_cfs.files import write_table, write_text
 from scenes.comply import tables
-from scenes.comply.assess import NO_VERDICT, NOT_COMPUTED, BuildingVerdict, RoomVerdict
+from scenes.comply.assess import NO_VERDICT, NOT_COMPUTED, BuildingVerdict, RoomVerdict, assess_building
+from scenes.comply.dwellings import OF_DWELLING
 from scenes.comply.findings import SeatGlare
 from scenes.comply.results import CheckedRoom, Compliance, GridSummary
 from scenes.comply.rules import NOT_MET, RuleTable
@@ -36,7 +38,7 @@ from scenes.quick import NOTE
 from scenes.report.glare_figures import compass, glare_plan
 from scenes.report.names import stage_words
 from scenes.report.page import FILES as SHARED
-from scenes.report.page import environment, head_lines
+from scenes.report.page import environment, head_lines, prose
 from scenes.report.page_files import page_files
 from scenes.report.room import RoomSection, facts
 from scenes.report.tables import Table, problems_table
@@ -71,6 +73,7 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
     met = len(asked) - len(unknown) - len(missed)
     criterion = verdict.criterion
     parts = [f"{_capital(gettext(criterion.words_of(verdict.reached)))}."]
+    parts += _as_one_dwelling(result, verdict)
     if missed and criterion.missed != NOT_MET:
         parts = [f"{colon(_capital(gettext(criterion.missed)), _names(missed))}."]
     elif missed and not met and not unknown:
@@ -107,6 +110,31 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
         blinds = translated(result.blinds) if operated else gettext("all blinds open")
         parts.append(gettext("Rated with {blinds}.", blinds=blinds))
     return " ".join(parts)
+
+
+def _as_one_dwelling(result: Compliance, verdict: BuildingVerdict) -> Iterator[str]:
+    """The level of the building if all its rooms are one dwelling, where none is named and it is another."""
+    criterion = verdict.criterion
+    if criterion.over != OF_DWELLING or any(room.use.dwelling for room in result.rooms):
+        return
+    own = [
+        (room, one)
+        for room in result.rooms
+        for one in room.verdicts
+        if one.rule == verdict.rule and one.criterion.key == criterion.key and one.applies
+    ]
+    areas = [room.space.floor_area for room, _ in own]
+    homes = [criterion.key for _ in own]
+    (whole,) = assess_building([(one,) for _, one in own], areas, homes) if own else (verdict,)
+    if whole.reached == verdict.reached:
+        return
+    best = [room.space.label for room, one in own if one.reached == whole.reached]
+    yield gettext(
+        "No dwelling is named, and each room is taken as one; if all rooms are one dwelling: {level} ({rooms}). A "
+        "mapping file (--uses) names dwellings.",
+        level=gettext(criterion.words_of(whole.reached)),
+        rooms=_names(best),
+    )
 
 
 def _least_favourable(asked: Sequence[tuple[CheckedRoom, RoomVerdict]]) -> Iterator[str]:
@@ -328,7 +356,8 @@ def dossier_html(result: Compliance, *, quick: bool = False, page: PageOptions =
 
 
 def _filled(result: Compliance, *, quick: bool, page: PageOptions) -> str:
-    rooms = [dossier_room(result, room, i) for i, room in enumerate(result.rooms, 1)]
+    by_name = sorted(result.rooms, key=lambda room: natural_key(room.space.label))
+    rooms = [dossier_room(result, room, i) for i, room in enumerate(by_name, 1)]
     style = (SHARED["style.css"], FILES["dossier.css"])
     return (
         environment(FILES)
@@ -341,9 +370,10 @@ def _filled(result: Compliance, *, quick: bool, page: PageOptions) -> str:
             quick=gettext(NOTE) if quick else "",
             notes=head_lines(result.head, result.notes),
             assumptions=[translated(text) for text in result.assumptions],
+            settings=[translated(text) for text in result.settings],
             rules=[dossier_rule(result, name) for name in result.rules],
             rooms=rooms,
-            problems=problems_table(result.issues),
+            problems=tied_table(problems_table(result.issues)),
             version=metadata.version("mitsuba-cfs"),
             seconds=tied(_seconds(result.seconds)),
             style=Markup("\n".join(style)),
@@ -377,7 +407,7 @@ def dossier_room(result: Compliance, room: CheckedRoom, number: int) -> DossierR
         tuple(map(tied, tables.missed(result.rules, room))),
         tuple(table for table in room_tables if table.rows),
         sun_bars(result, room),
-        tables.openings_table(room),
+        tables.openings_table(room, result.building),
         _glare_rose(room),
     )
 
@@ -475,7 +505,7 @@ def _map_words(glare: SeatGlare) -> str:
 
 def tied(text: str) -> str:
     """A text whose numbers stay with their signs and units at the end of a line."""
-    return TOGETHER.sub("\N{NO-BREAK SPACE}", text)
+    return TOGETHER.sub("\N{NO-BREAK SPACE}", prose(text))
 
 
 def tied_table(table: Table) -> Table:
@@ -546,7 +576,8 @@ def write_compliance(
         issues = pd.DataFrame(rows, columns=list(COLUMNS))
         write_table(issues, place / "problems.csv", index=False)
         write_text(place / MODEL_CHECK.name, MODEL_CHECK.read_text("utf-8"))
-        write_room_topics(result, place / "issues.bcf")
+        if any(any(missed(result.rules, room)) for room in result.rooms):
+            write_room_topics(result, place / "issues.bcf")
         write_text(place / "dossier.html", dossier_html(result, quick=quick, page=page))
 
 

@@ -77,3 +77,4 @@ class Compliance:
     issues: tuple[Issue, ...]
     seconds: dict[str, float]  # by part
     blinds: str = ""  # how they move where glare, temperatures and light at the eye are judged, in words
+    settings: tuple[str, ...] = ()  # sentences: numerical settings, and classes of systems that no verdict rests on

@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 
+import numpy as np
 import pandas as pd
 
+from bim.bcf import in_model
+from bim.model import Building
+from bim.names import natural_key
 from scenes.comply.assess import NOT_FOR_IT, RoomVerdict
 from scenes.comply.needs import Need
 from scenes.comply.results import CheckedRoom, Compliance
@@ -34,6 +38,7 @@ USE_WORDS = {  # of the uses that come with the program
     "office": N_("office"),
     "unknown": N_("use unknown"),
 }
+UP = np.array([0.0, 0.0, 1.0])
 MOST_DIGITS = 5  # behind the decimal point of a value beside its limit
 COLUMNS = (
     "room",
@@ -89,9 +94,8 @@ def use_words(use: RoomUse) -> str:
 
 def building_table(result: Compliance, rule: str) -> Table:
     """The building against the criteria of a rule."""
-    columns = [_text(gettext("Criterion")), _text(gettext("Clause")), _text(gettext("Quantity"))]
-    columns += [_text(gettext("Value by level (limit)")), _text(gettext("Level reached"))]
-    columns.append(Column(gettext("Rooms")))
+    columns = [_text(gettext("Criterion")), _text(gettext("Level reached")), _text(gettext("Value by level (limit)"))]
+    columns += [_text(gettext("Quantity")), _text(gettext("Clause")), Column(gettext("Rooms"))]
     rows = []
     for verdict in result.verdicts:
         if verdict.rule != rule or not verdict.rooms or verdict.criterion.over == "no building":
@@ -104,10 +108,10 @@ def building_table(result: Compliance, rule: str) -> Table:
         rows.append(
             (
                 gettext(one.title),
-                clause(one),
-                words,
-                semicolons(levels),
                 gettext(one.words_of(verdict.reached)),
+                semicolons(levels),
+                words,
+                clause(one),
                 str(verdict.rooms),
             )
         )
@@ -155,7 +159,7 @@ def rooms_table(result: Compliance, rule: str) -> Table:
             rounded(room.space.floor_area, 1),
             *(_short(room.verdicts[i]) for i in numbers),
         )
-        for room in result.rooms
+        for room in sorted(result.rooms, key=lambda room: natural_key(room.space.label))
     ]
     return Table(gettext("Levels reached by room"), tuple(columns), tuple(rows))
 
@@ -212,16 +216,22 @@ def missed(rules: Mapping[str, RuleTable], room: CheckedRoom) -> Iterator[str]:
         yield colon(head, semicolons(numbers))
 
 
-def openings_table(room: CheckedRoom) -> Table | None:
-    """The sunlight of each opening of a room."""
+def openings_table(room: CheckedRoom, building: Building) -> Table | None:
+    """The sunlight of each opening of a room, its reference point in the axes of the model's file."""
     if room.sun is None:
         return None
     columns = [_text(gettext("Opening")), *(Column(axis, "m") for axis in "xyz")]
     columns += [Column(gettext("Sunlight"), "h"), _text(gettext("Times (local standard time)"))]
     rows = [
-        (one.name, *(cell(v, 2) for v in one.point), cell(one.hours, 2), spans(one.times)) for one in room.sun.openings
+        (
+            one.name if one.name == one.guid else f"{one.name} ({one.guid})",
+            *(cell(v, 2) for v in in_model(building, one.point, UP)[0]),
+            cell(one.hours, 2),
+            spans(one.times),
+        )
+        for one in room.sun.openings
     ]
-    title = gettext("Sunlight at the reference points of the openings")
+    title = gettext("Sunlight at the reference points of the openings, in the coordinates of the model file")
     return Table(title, tuple(columns), tuple(rows))
 
 

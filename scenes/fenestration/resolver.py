@@ -311,6 +311,12 @@ def _listed(names: Sequence[str]) -> str:
     return Note("{names} and {count} more", names=text, count=left) if left else text
 
 
+VALUE_NAMES = {  # of `StatedValues`, in words
+    "u_value": N_("U"),
+    "g_value": N_("g"),
+    "visible": N_("visible transmittance"),
+    "solar": N_("solar transmittance"),
+}
 PANES = (1, 2, 3)  # that Roos' factor knows
 NO_SHADE = (None, "none")
 HONEYBEE_SUFFIXES = (".hbjson",)
@@ -329,6 +335,8 @@ class StatedValues:
     glass: PlainGlass | None = None  # a single pane, whose law of the angle is known
     generic: str = ""  # name of the generic glazing that values come from
     unstated: bool = False  # all of them, as the file states none
+    given: tuple[str, ...] = ()  # names of the values that the user gives
+    assumed: tuple[str, ...] = ()  # names of the values that are the generic glazing's
 
     def missing(self, light_only: bool) -> str:
         """What is needed and not stated, in words; empty where nothing is missing."""
@@ -372,6 +380,7 @@ def stated_values(held: Held, window: Window, path: Path, overrides: WindowOverr
         window.panes if window.panes in PANES else None,
         any(state.shading_position not in NO_SHADE for state in states),
         window.glass if overrides.visible is None else None,
+        given=tuple(name for name in VALUE_NAMES if name != "solar" and getattr(overrides, name) is not None),
     )
     values = _completed(values, overrides, path)
     for name in ("visible", "solar", "g_value"):
@@ -407,6 +416,13 @@ def _completed(values: StatedValues, overrides: WindowOverrides, path: Path) -> 
         panes=values.panes or generic.panes,
         generic=name,
         unstated=unknown,
+        assumed=tuple(
+            name
+            for name in VALUE_NAMES
+            if getattr(values, name) is None
+            and getattr(generic, name) is not None
+            and (name != "solar" or values.g_value is None)
+        ),
     )
 
 
@@ -485,10 +501,29 @@ def _values_source(values: StatedValues, file: str) -> Note:
     """Where the values of a glazing are from."""
     if values.unstated:
         return Note("the values of {generic}, as {file} states none", generic=values.generic, file=file)
-    if values.generic:
-        template = N_("the values given or stated in {file} and, where there are none, those of {generic}")
-        return Note(template, file=file, generic=values.generic)
-    return Note("the values stated in {file}", file=file)
+    known = [name for name in VALUE_NAMES if getattr(values, name) is not None]
+    stated = [name for name in known if name not in (*values.given, *values.assumed)]
+    if known == stated:
+        return Note("the values stated in {file}", file=file)
+    parts = []
+    if values.given:
+        parts.append(Note("the given values ({values})", values=_named(values.given)))
+    if stated:
+        parts.append(Note("{file} ({values})", file=file, values=_named(stated)))
+    if values.assumed:
+        template = N_("{generic}, assumed where the file states no value ({values})")
+        parts.append(Note(template, generic=values.generic, values=_named(values.assumed)))
+    if len(parts) == 1:
+        return parts[0]
+    if len(parts) == 2:
+        return Note("{first} and {second}", first=parts[0], second=parts[1])
+    return Note("{first}, {second} and {third}", first=parts[0], second=parts[1], third=parts[2])
+
+
+def _named(values: Sequence[str]) -> Note:
+    """Values of a glazing by name, in the order of `VALUE_NAMES`."""
+    names = {name: Note(VALUE_NAMES[name]) for name in VALUE_NAMES if name in values}
+    return Note(", ".join(f"{{{name}}}" for name in names), **names)
 
 
 def _in_words(values: StatedValues, digits: int) -> Note:

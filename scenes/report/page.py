@@ -6,7 +6,7 @@ import base64
 import re
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -188,6 +188,7 @@ def write_check(building: Building, head: Sequence[str], path: Path, before: Bui
 
     Args: head: its first lines; before: the same file without its corrections.
     """
+    problems = tables.problems_table(building.issues)
     text = (
         environment()
         .get_template("check.html.j2")
@@ -196,7 +197,7 @@ def write_check(building: Building, head: Sequence[str], path: Path, before: Bui
             title=building.name or gettext("Building"),
             head=head,
             model=checked_model(building, before),
-            problems=tables.problems_table(building.issues),
+            problems=replace(problems, rows=tuple(tuple(map(prose, row)) for row in problems.rows)),
             style=Markup(FILES["style.css"]),
             scripts=Markup("\n".join(FILES[name] for name in SCRIPTS[:-1])),
         )

@@ -155,15 +155,15 @@ def problems_table(issues: Iterable[Issue]) -> Table:
     glass = (Column(gettext("Glass"), "m²"),) if glazed else ()
     columns = (
         *glass,
-        Column(gettext("Element"), numeric=False),
         Column(gettext("Problem"), numeric=False),
         Column(gettext("Treatment in the model"), numeric=False),
+        Column(gettext("Element"), numeric=False),
     )
     rows = tuple(
         (
             *((cell(one.glass, 2) if one.glass else "–",) if glazed else ()),
-            one.first.where,
             *issue_cells(one.text("command", gettext)),
+            one.first.where,
         )
         for one in kinds
     )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import ifcopenshell
 import ifcopenshell.api.pset
 import ifcopenshell.guid
@@ -11,6 +13,9 @@ import pytest
 from bim.ifc import cut_rooms
 from bim.ifc.building import read_ifc
 from bim.ifc.north import north_rotation
+from bim.ifc.project import site_location
+from bim.names import natural_key
+from bim.report.issue import issue_text
 from mitsuba_cfs.processes import ProcessEnded
 from tests.bim.small_ifc import DEPTH, HEIGHT, WALL, WIDTH, box_model, empty_project
 from tests.issues import codes, of_code
@@ -100,6 +105,7 @@ def test_a_space_through_its_roof_is_cut_there(tmp_path):
     assert space.drawn_volume == pytest.approx(WIDTH * DEPTH * (HEIGHT + 1), abs=0.01)
     (issue,) = of_code(building, "room-cut")
     assert issue.values["before"] == pytest.approx(WIDTH * DEPTH * (HEIGHT + 1), abs=0.01)
+    assert "extends 1.00 m above the slab, roof or ceiling that covers it" in issue_text(issue, "command").what
     assert any(face.kind == "roof" and face.element is not None for face in space.faces)
 
 
@@ -213,3 +219,27 @@ def test_a_beam_that_is_a_space_is_no_wrong_unit(tmp_path):
     small.box("IfcSpace", "SHS beam", (0.0, 0.0, 2.5), (WIDTH, 0.1, 0.1))
     building = _read(small, tmp_path)
     assert not of_code(building, "length-unit-wrong")
+
+
+@pytest.mark.parametrize(
+    "latitude, longitude, said",
+    [
+        ((24, 28, 0), (54, 25, 0), ["Archicad"]),
+        ((42, 21, 31), (-71, -3, -24), ["Revit"]),
+        ((49, 6, 1), (8, 26, 11), []),
+    ],
+)
+def test_the_default_site_of_an_exporter_is_named(latitude, longitude, said):
+    site = SimpleNamespace(GlobalId="s", RefLatitude=latitude, RefLongitude=longitude, RefElevation=0.0)
+    *_, issues = site_location(SimpleNamespace(by_type=lambda _: [site]))
+    assert [issue.values["program"] for issue in issues] == said
+
+
+def test_rooms_are_sorted_by_their_numbers():
+    assert sorted(["10 Bad", "2 Flur", "1b", "1 Bad", "Flur"], key=natural_key) == [
+        "1 Bad",
+        "1b",
+        "2 Flur",
+        "10 Bad",
+        "Flur",
+    ]

@@ -9,6 +9,7 @@ from bim.ifc.cut_rooms import cut_rooms
 from bim.ifc.shapes import Shape
 from bim.ifc.spaces import SpaceRecord
 from bim.rays import ray_mesh
+from bim.report.issue import issue_text
 from bim.rooms import room_solid
 from bim.solids import solid_of
 from tests.bim.test_eaves import body
@@ -35,6 +36,8 @@ def test_the_part_above_the_roof_is_outdoors():
     # a wedge of 2 m by 1 m across the room's width, the roof's body included
     assert record.volume == pytest.approx(72.0 - 4.0, rel=0.01)
     assert issue.code == "room-cut" and issue.values["before"] == 72.0
+    text = issue_text(issue, "command").what
+    assert text == "Space r extends through the sloping roof or ceiling that covers it"
 
 
 def test_a_dormer_is_kept():

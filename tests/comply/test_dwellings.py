@@ -13,6 +13,7 @@ from mitsuba_cfs.sky.epw import read_epw
 from scenes.comply.assess import NOT_FOR_IT, assess_room, values_of
 from scenes.comply.dwellings import dwelling_words, dwellings_of, judged
 from scenes.comply.findings import Findings, calendar_of
+from scenes.comply.outputs import answers
 from scenes.comply.results import CheckedRoom
 from scenes.comply.rules import NOT_MET, read_rule
 from scenes.comply.sunlight import SunExposure
@@ -77,6 +78,21 @@ def test_rooms_of_no_dwelling_are_asked_one_by_one(calendar):
     named, alone = dwelling_words(rooms)
     assert "dwellings are A (3)" in named and "--uses" in named
     assert "without a named dwelling are assessed individually: 1, 2" in alone
+
+
+def _answer(rooms, verdicts) -> str:
+    """The sentence on the sunlight of dwellings."""
+    result = SimpleNamespace(rooms=rooms, verdicts=verdicts, rules=RULES, weather=None)
+    return next(text for title, text in answers(result) if "dwelling" in title)
+
+
+def test_a_house_whose_dwelling_is_not_named_has_its_level_as_one_dwelling_too(calendar):
+    rooms, verdicts = checked(calendar, ("Schlafen", "bedroom", "", 2.0), ("Wohnen", "living", "", 4.5))
+    text = _answer(rooms, verdicts)
+    assert text.startswith("Minimum. No dwelling is named, and each room is taken as one; if all rooms are one ")
+    assert "dwelling: high (Wohnen)." in text
+    named = checked(calendar, ("Schlafen", "bedroom", "House", 2.0), ("Wohnen", "living", "House", 4.5))
+    assert _answer(*named).startswith("High.") and "No dwelling" not in _answer(*named)
 
 
 def test_offices_have_hours_and_miss_nothing_wards_are_asked_each(calendar):

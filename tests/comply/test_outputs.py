@@ -13,6 +13,7 @@ import pandas as pd
 import pytest
 from click.testing import CliRunner
 
+from bim.model import Element
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
 from scenes.commands.comply import command
@@ -20,6 +21,7 @@ from scenes.comply.comply import check_rooms
 from scenes.comply.files import ComplyFiles, least_altitude, read_files
 from scenes.comply.findings import SeatGlare
 from scenes.comply.options import ComplyOptions
+from scenes.comply.outdoors import has_surroundings
 from scenes.comply.outputs import (
     answers,
     dossier_html,
@@ -34,7 +36,7 @@ from scenes.comply.outputs import (
 )
 from scenes.comply.results import GridSummary, RoomLights
 from scenes.comply.rules import read_rule
-from scenes.comply.tables import beside_limit, shown
+from scenes.comply.tables import beside_limit, openings_table, shown
 from scenes.comply.uses import read_uses
 from scenes.demo import OFFICE, WEATHER
 from scenes.input_files import InputFiles, read_building, read_weather
@@ -324,6 +326,38 @@ def test_topics_are_of_rooms_that_miss_something(result, tmp_path):
     title, text = found["Meeting room-guid"]
     assert title == "Meeting room: 2 criteria not met"
     assert "clause 7.2" in text and "0.00 h, required ≥ 1.5 h for met" in text
+
+
+def test_no_topics_are_written_where_every_room_meets_its_criteria(result, tmp_path):
+    kept = tuple(replace(room, verdicts=()) for room in result.rooms)
+    write_compliance(replace(result, rooms=kept), ResultFolder(tmp_path / "out", "comply"))
+    assert not (tmp_path / "out" / "issues.bcf").exists()
+
+
+def test_openings_stand_in_the_axes_of_the_model_file(result):
+    """A model turned by a quarter: its x is the building's y."""
+    turned = np.array([[0.0, -1.0, 0.0, 5.0], [1.0, 0.0, 0.0, 7.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
+    room = next(room for room in result.rooms if room.sun is not None and room.sun.openings)
+    (row, *_) = openings_table(room, replace(result.building, from_model=turned)).rows
+    x, y, z = room.sun.openings[0].point
+    assert [float(cell.replace("−", "-")) for cell in row[1:4]] == pytest.approx([y - 7.0, 5.0 - x, z], abs=0.006)
+    assert room.sun.openings[0].guid in row[0]
+
+
+def test_a_model_without_surroundings_says_so(result):
+    text = "\n".join(result.assumptions)
+    assert "The model has no surroundings (neighbouring buildings, trees)" in text
+    tree = Element("t", "tree", "IfcBuildingElementProxy", 60.0 + np.eye(3)[None], 0.3, 0.3)
+    site = replace(tree, ifc_class="IfcSite")
+    assert not has_surroundings(replace(result.building, elements=(site,)))
+    assert has_surroundings(replace(result.building, elements=(site, tree)))
+
+
+def test_calculation_settings_stand_apart_from_the_assumptions(result):
+    html = dossier_html(replace(result, settings=("Light is computed with 64 paths per sensor.",)))
+    head, _, rest = html.partition('<section id="settings">')
+    assert "64 paths" in rest and "64 paths" not in head and "Calculation settings" in rest
+    assert "Calculation settings" not in dossier_html(result)
 
 
 def found_again(bcf: Path, file: Path) -> dict[str, tuple[str, np.ndarray]]:
