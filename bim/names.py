@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+import sys
 import unicodedata
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -137,7 +138,7 @@ def _names_of_parts(item: Named) -> set[str]:
 def natural_key(name: str) -> list[tuple[int, str]]:
     """For sorting names as people do: their numbers by value, 2 before 10."""
     parts = re.split(r"(\d+)", name.casefold())
-    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts if part]
+    return [(int(part), "") if part.isdecimal() else (sys.maxsize, part) for part in parts if part]
 
 
 def _key(name: str) -> str:

@@ -448,14 +448,13 @@ def test_a_file_that_states_one_value_and_the_reference_glazing_are_both_named(t
     overrides = WindowOverrides(glazing="double low-e")
     (system,) = next(iter(fill_windows(read_ifc(path).windows, overrides, path).values()))
     assert normal_transmittance(system.visible) == pytest.approx(0.7, abs=2e-3) and system.u_value == 1.2
-    assert (
-        system.source
-        == "room.ifc (visible transmittance) and double low-e, assumed where the file states no value (U, g)"
-    )
+    assumed = "double low-e, assumed where the file states no value"
+    assert system.source == f"room.ifc (visible transmittance) and {assumed} (U, g, solar transmittance)"
     given = replace(overrides, u_value=1.5)
     (system,) = next(iter(fill_windows(read_ifc(path).windows, given, path).values()))
-    assert system.source == (
-        "the given values (U), room.ifc (visible transmittance) and double low-e, assumed where the file states no value (g)"
+    assert (
+        system.source
+        == f"the given values (U), room.ifc (visible transmittance) and {assumed} (g, solar transmittance)"
     )
 
 
