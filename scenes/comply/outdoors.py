@@ -13,7 +13,7 @@ from bim.rays import RayMesh, ray_mesh
 FloatArray = NDArray[np.float64]
 
 TERRAIN = ("IfcSite", "IfcGeographicElement", "IfcCivilElement")
-APART = 3.0  # from the rooms, of what stands for itself: beyond eaves and balconies [m]
+APART = 3.0  # from the rooms, of an element that is no part of the building, beyond eaves and balconies [m]
 MOST_PANES = 24  # surfaces of a room's own windows that one ray passes
 STEP = 1e-5  # offset of a ray's new origin after a pane [m]
 _NOTHING = Element("", "nothing", "IfcSite", -1e9 + np.eye(3)[None], 0.0, 0.0)

@@ -335,7 +335,7 @@ class StatedValues:
     glass: PlainGlass | None = None  # a single pane, whose law of the angle is known
     generic: str = ""  # name of the generic glazing that values come from
     unstated: bool = False  # all of them, as the file states none
-    given: tuple[str, ...] = ()  # names of the values that the user gives
+    by_user: tuple[str, ...] = ()  # names of the values that the user gives
     assumed: tuple[str, ...] = ()  # names of the values that are the generic glazing's
 
     def missing(self, light_only: bool) -> str:
@@ -380,7 +380,7 @@ def stated_values(held: Held, window: Window, path: Path, overrides: WindowOverr
         window.panes if window.panes in PANES else None,
         any(state.shading_position not in NO_SHADE for state in states),
         window.glass if overrides.visible is None else None,
-        given=tuple(name for name in VALUE_NAMES if name != "solar" and getattr(overrides, name) is not None),
+        by_user=tuple(name for name in VALUE_NAMES if name != "solar" and getattr(overrides, name) is not None),
     )
     values = _completed(values, overrides, path)
     for name in ("visible", "solar", "g_value"):
@@ -502,12 +502,12 @@ def _values_source(values: StatedValues, file: str) -> Note:
     if values.unstated:
         return Note("the values of {generic}, as {file} states none", generic=values.generic, file=file)
     known = [name for name in VALUE_NAMES if getattr(values, name) is not None]
-    stated = [name for name in known if name not in (*values.given, *values.assumed)]
+    stated = [name for name in known if name not in (*values.by_user, *values.assumed)]
     if known == stated:
         return Note("the values stated in {file}", file=file)
     parts = []
-    if values.given:
-        parts.append(Note("the given values ({values})", values=_named(values.given)))
+    if values.by_user:
+        parts.append(Note("the given values ({values})", values=_named(values.by_user)))
     if stated:
         parts.append(Note("{file} ({values})", file=file, values=_named(stated)))
     if values.assumed:
