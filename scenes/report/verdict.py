@@ -14,7 +14,7 @@ from mitsuba_cfs.glare.indices import DGP_IN_DARK, DGP_PER_LUX
 from mitsuba_cfs.notes import Note
 from scenes.language.catalogue import gettext, ngettext
 from scenes.language.numbers import colon, month_name, percent, rounded, semicolons, share, significant, spoken
-from scenes.report.answer import judged, limits_counted, rooms_answer
+from scenes.report.answer import judged, rooms_answer
 from scenes.report.glare_figures import sun_words
 from scenes.report.headline import FAIR, GOOD, POOR, WARM_C, Card, dgp_error, heated, occupied
 from scenes.report.method import METHODS
@@ -24,7 +24,7 @@ from scenes.report.tables import GLARE_WORDS, Column, Table, glare_class, step_h
 from scenes.results import ExploredRoom, LuminancePicture, RoomYear, RunResult
 
 MOST_ROOMS = 6  # whose figures are shown one by one on the page of the verdict
-WORST = 3  # rooms that are named where there are more
+WORST = 2  # rooms that are named where there are more
 GRADES = (GOOD, FAIR, POOR)
 
 Named = tuple[str, RoomYear, Sequence[Card]]  # a room or case, its results, its headline figures
@@ -54,11 +54,11 @@ def _every(rooms: Sequence[Named], of: str) -> Table:
         Column(of, numeric=False),
         Column(gettext("Quantity"), numeric=False),
         Column(gettext("Value"), numeric=False, short=True),
-        Column(gettext("Limit"), numeric=False),
+        Column(gettext("Rating"), numeric=False),
         Column(gettext("Standard error"), numeric=False),
     )
     rows = tuple(
-        (name, card.label, _value(card), card.verdict, _error(room, card))
+        (name, _of_standard(card), _value(card), card.verdict, _error(room, card))
         for name, room, own in rooms
         for card in own
         if card.verdict
@@ -70,7 +70,7 @@ def _by_figure(rooms: Sequence[Named]) -> Table:
     """A row for each figure: how many meet what, which are the worst, the error of the worst."""
     columns = (
         Column(gettext("Quantity"), numeric=False),
-        Column(gettext("Rooms by limit"), numeric=False),
+        Column(gettext("Rooms by rating"), numeric=False),
         Column(gettext("Worst rooms"), numeric=False),
         Column(gettext("Standard error of the worst"), numeric=False),
     )
@@ -81,8 +81,13 @@ def _by_figure(rooms: Sequence[Named]) -> Table:
         counts = Counter((GRADES.index(card.grade), card.verdict) for _, _, card in result)
         meets = semicolons([colon(str(counts[key]), key[1]) for key in sorted(counts)])
         worst = semicolons([colon(name, _value(card)) for name, _, card in result[:WORST]])
-        rows.append((label, meets, worst, _error(*result[0][1:])))
+        rows.append((_of_standard(result[0][2]), meets, worst, _error(*result[0][1:])))
     return Table(gettext("Results and limits of the standards"), columns, tuple(rows))
+
+
+def _of_standard(card: Card) -> str:
+    """A figure with the standard that limits it."""
+    return f"{card.label} ({card.standard})" if card.standard else card.label
 
 
 def _value(card: Card) -> str:
@@ -151,7 +156,7 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
     )
     named = [(r.space.label, r, card) for r, card in zip(result.spaces, cards, strict=True)]
     cases = [judged(name, figures) for name, _, figures in named]
-    answer = " ".join(filter(None, (rooms_answer(cases), limits_counted(cases))))
+    answer = rooms_answer(cases)
     answers = (("", answer),) if answer else ()
     return Verdict(question, answers, sentences, limits(named, gettext("Room")))
 
@@ -282,15 +287,21 @@ def _shading(result: RunResult) -> str:
     rows = list(zip(moved, drawn, cost, strict=True))
     if len(moved) > MOST_NAMES:
         rows.sort(key=lambda one: -one[1])
-        parts = [
-            gettext(
-                "{rooms}: the shading is in use in {least} to {most} % of the occupied daylight hours, most in {room}.",
-                rooms=rooms_counted(len(moved)),
-                least=percent(min(drawn)),
-                most=percent(max(drawn)),
-                room=rows[0][0].space.label,
-            )
-        ]
+        least, most, counted = percent(min(drawn)), percent(max(drawn)), rooms_counted(len(moved))
+        if least == most:
+            equal = "{room}: the shading is in use in {share} % of the occupied daylight hours."
+            parts = [gettext(equal, room=counted, share=most)]
+        else:
+            parts = [
+                gettext(
+                    "{rooms}: the shading is in use in {least} to {most} % of the occupied daylight hours, "
+                    "most in {room}.",
+                    rooms=counted,
+                    least=least,
+                    most=most,
+                    room=rows[0][0].space.label,
+                )
+            ]
         rows = rows[:1]  # what it costs where it is drawn most
     else:
         parts = []

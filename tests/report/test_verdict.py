@@ -110,8 +110,8 @@ def test_figures_stand_against_limits_with_their_errors(result) -> None:
     found = limits.shown
     assert limits.folded is None
     by_figure = {row[1]: row for row in found.rows}
-    assert "LM-83" in by_figure["Annual sunlight exposure"][3]
-    assert "% of each illuminance" in by_figure["Spatial daylight autonomy"][4]
+    assert "LM-83" in by_figure["Annual sunlight exposure (LM-83)"][3]
+    assert "% of each illuminance" in by_figure["Spatial daylight autonomy (LM-83)"][4]
     assert {row[0] for row in found.rows} == {room.space.label for room in result.spaces}
 
 
@@ -123,13 +123,13 @@ def test_many_rooms_stay_on_one_page_with_the_worst_of_each_figure() -> None:
     shown, folded = found.limits.shown, found.limits.folded
     judged = [(room, card) for room, own in zip(run.spaces, every, strict=True) for card in own if card.verdict]
     assert len(folded.rows) == len(judged) > 250
-    labels = list(dict.fromkeys(card.label for _, card in judged))
-    assert [row[0] for row in shown.rows] == labels
-    for label, meets, worst, _ in shown.rows:
+    labels = list(dict.fromkeys((card.label, card.standard) for _, card in judged))
+    assert [row[0] for row in shown.rows] == [f"{label} ({of})" if of else label for label, of in labels]
+    for (label, _), (_, meets, worst, _) in zip(labels, shown.rows, strict=True):
         own = [(room, card) for room, card in judged if card.label == label]
         assert sum(int(part.split(":")[0]) for part in meets.split("; ")) == len(own)
-        assert worst.count(";") == 2
-    sunlight = next(row for row in shown.rows if row[0] == "Annual sunlight exposure")
+        assert worst.count(";") == 1
+    sunlight = next(row for row in shown.rows if row[0] == "Annual sunlight exposure (LM-83)")
     most = max(room.daylight.room_metrics["ase1000_250"] for room in run.spaces)
     assert f": {percent(most)} %" in sunlight[2].split(";")[0]
     text = dict(found.sentences)["Shading"]
