@@ -38,7 +38,7 @@ from scenes.comply.findings import EyeLight, Findings, GridLight, RoomHeat, Seat
 from scenes.comply.glare import PICTURED, seat_glare, worst_seat_glare
 from scenes.comply.needs import DgpExceeded
 from scenes.comply.options import ComplyOptions
-from scenes.comply.outdoors import OutdoorMesh, has_surroundings, outdoors_of
+from scenes.comply.outdoors import OutdoorMesh, outdoors_of
 from scenes.comply.results import CheckedRoom, Compliance, GridSummary, RoomLights
 from scenes.comply.rules import GridTable
 from scenes.comply.sunlight import SunExposure, sun_day, sun_exposure
@@ -74,6 +74,7 @@ from scenes.room.spectral import eye_illuminances
 from scenes.room.zone import room_zone, zone_surfaces
 from scenes.run.first_plan import FROM, OnPlan, first_plan
 from scenes.run.options import JobOptions
+from scenes.surroundings import NO_SURROUNDINGS, has_surroundings
 from thermal.errors import ThermalInputError
 from thermal.ratings import CLASSES, ThermalRating
 
@@ -622,10 +623,7 @@ class Check:
         """What was assumed for sun and view."""
         files, options = self.files, self.options
         if not options.surroundings and not has_surroundings(self.building):
-            yield Note(
-                "The model has no surroundings (neighbouring buildings, trees): daylight, view out and sunlight are "
-                "those of a free horizon; --surroundings adds them."
-            )
+            yield NO_SURROUNDINGS
         if "sun" in self.parts:
             month, day = options.day
             yield Note(

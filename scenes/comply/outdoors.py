@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 
 from bim.model import Building, Element, Space
 from bim.rays import RayMesh, ray_mesh
+from scenes.surroundings import TERRAIN
 
 FloatArray = NDArray[np.float64]
 
-TERRAIN = ("IfcSite", "IfcGeographicElement", "IfcCivilElement")
-APART = 3.0  # from the rooms, of an element that is no part of the building, beyond eaves and balconies [m]
 MOST_PANES = 24  # surfaces of a room's own windows that one ray passes
 STEP = 1e-5  # offset of a ray's new origin after a pane [m]
 _NOTHING = Element("", "nothing", "IfcSite", -1e9 + np.eye(3)[None], 0.0, 0.0)
@@ -65,22 +64,6 @@ def outdoors_of(building: Building) -> OutdoorMesh:
         tuple(element.guid for element in elements),
         np.array([element.ifc_class.startswith(TERRAIN) for element in elements], dtype=bool),
     )
-
-
-def has_surroundings(building: Building) -> bool:
-    """Whether anything but terrain stands beside the rooms and what is built on to them."""
-    shells = [space.shell.reshape(-1, 3)[:, :2] for space in building.spaces]
-    if not shells:
-        return bool(building.elements)
-    corners = np.concatenate(shells)
-    low, high = corners.min(axis=0) - APART, corners.max(axis=0) + APART
-    for element in building.elements:
-        points = element.triangles.reshape(-1, 3)[:, :2]
-        if element.ifc_class.startswith(TERRAIN) or not len(points):
-            continue
-        if (points.min(axis=0) > high).any() or (points.max(axis=0) < low).any():
-            return True
-    return False
 
 
 def opaque_room(space: Space) -> RayMesh:

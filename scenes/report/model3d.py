@@ -200,20 +200,6 @@ def _model(
     )
 
 
-def surroundings_note(building: Building) -> str:
-    """A sentence where nothing stands around the building, as views and light then are those of an open field."""
-    low, high = building_box(building)[:, :2] if building.spaces else np.zeros((2, 2))
-    for element in building.elements:
-        points = element.triangles.reshape(-1, 3)[:, :2]
-        beside = len(points) and bool(((points < low - BESIDE) | (points > high + BESIDE)).any())
-        if beside and not element.ifc_class.startswith(TERRAIN):
-            return ""
-    return gettext(
-        "No surroundings are modelled: daylight, sun and view out are those of a site without buildings and trees "
-        "(--surroundings adds them)."
-    )
-
-
 def cut_to(triangles: NDArray[np.float64], low: NDArray[np.float64], high: NDArray[np.float64]) -> NDArray[np.float64]:
     """The part of the triangles [T, 3, 3] within an upright box."""
     for axis, sign, corner in [(a, s, c) for a in range(3) for s, c in ((1.0, low), (-1.0, high))]:

@@ -27,13 +27,14 @@ from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.quick import NOTE
 from scenes.report import tables
 from scenes.report.method import method_words
-from scenes.report.model3d import checked_model, model3d, surroundings_note
+from scenes.report.model3d import checked_model, model3d
 from scenes.report.names import glossary, option_words, stage_words
 from scenes.report.page_files import page_files
 from scenes.report.room import room_page
 from scenes.report.storeys import RoomMetric, room_metrics, storey_plans
 from scenes.report.verdict import verdict
 from scenes.results import RunResult
+from scenes.surroundings import NO_SURROUNDINGS, has_surroundings
 
 INNER, OUTER, EDGE = 620.0, 1000.0, 1130.0  # radii of the ring and the picture [SVG units]
 DAYS = ((6, 21), (3, 21), (12, 21))  # month and day of the paths
@@ -210,6 +211,7 @@ def _filled(result: RunResult, page: PageOptions) -> str:
     manifest = result.manifest
     model = model3d(result)
     several = len(rooms) > 1
+    alone = () if has_surroundings(result.building) else (NO_SURROUNDINGS,)
     metrics = room_metrics(result) if several else ()
     return (
         environment()
@@ -218,7 +220,7 @@ def _filled(result: RunResult, page: PageOptions) -> str:
             page=page,
             title=page.title or result.building.name or gettext("Building"),
             result=result,
-            head=(*head_lines(result.head, result.notes), *filter(None, [surroundings_note(result.building)])),
+            head=head_lines(result.head, (*result.notes, *alone)),
             rooms=rooms,
             verdict=verdict(result, [room.cards for room in rooms]),
             model=model,

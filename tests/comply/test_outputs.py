@@ -21,7 +21,6 @@ from scenes.comply.comply import check_rooms
 from scenes.comply.files import ComplyFiles, least_altitude, read_files
 from scenes.comply.findings import SeatGlare
 from scenes.comply.options import ComplyOptions
-from scenes.comply.outdoors import has_surroundings
 from scenes.comply.outputs import (
     answers,
     dossier_html,
@@ -43,6 +42,7 @@ from scenes.input_files import InputFiles, read_building, read_weather
 from scenes.page_options import PageOptions
 from scenes.result_folder import ResultFolder
 from scenes.results import GlareMap
+from scenes.surroundings import has_surroundings
 from tests.devtools import Page, chromium
 
 HEAD = """
