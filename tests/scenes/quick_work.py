@@ -172,6 +172,7 @@ WORK = {
     "scenes.bsdf_generation.generated_file": _generated_file,
     "scenes.study.one_case.compute_case": _case,
     "scenes.study_report.write_study_report": _study_report,
+    "scenes.design.page.write_study_report": _study_report,  # imported by name, perhaps before
 }
 
 
