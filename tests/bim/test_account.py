@@ -245,7 +245,7 @@ def test_storey_without_spaces_and_window_above_a_low_room_are_named(tmp_path):
     building = read(tmp_path, small)
     assert building.account.share_used == pytest.approx(0.5, rel=1e-3)
     assert building.account.glass_missing == pytest.approx(GLASS_AREA, rel=1e-3)
-    assert "storey attic has no rooms and 3.6 m2 of unused glass" in building.account.lines[2]
+    assert "3.6 m2 of the unused glass in storey attic, which has no rooms" in building.account.lines[2]
 
 
 @pytest.mark.parametrize("suffix", ["ifc", "ifczip"])

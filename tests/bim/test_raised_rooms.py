@@ -64,7 +64,7 @@ def test_void_above_a_drawn_ceiling_is_not_the_room(tmp_path, short):
 def test_ceiling_that_nobody_drew_is_assumed_where_little_would_be_won(tmp_path):
     building = read(tmp_path, box_model(space_height=2.0)[0])
     assert building.spaces[0].raised == 0.0
-    assert said(building) == "it is kept as drawn: the 1.00 m above it may be the void of a ceiling that is not drawn"
+    assert said(building) == "it is kept as drawn, because the 1.00 m above it may be the void of a ceiling that is not drawn"
     assert building.account.low == ("R1 Room",)
 
 
@@ -84,7 +84,7 @@ def test_stated_ceiling_is_believed(tmp_path, relation):
         ifcopenshell.api.pset.edit_qto(small.model, qto=quantities, properties=heights)
     building = read(tmp_path, small)
     assert building.spaces[0].raised == 0.0
-    assert "kept as drawn: " in said(building) and "eiling" in said(building)
+    assert "kept as drawn, because " in said(building) and "eiling" in said(building)
 
 
 @pytest.mark.parametrize("height", [LOW, HEIGHT])
