@@ -41,7 +41,7 @@ RANKS = {
             "pictures",
             "room_views",
         },
-        {"cluster", "page_options", "provision_levels", "uncertain_inputs"},
+        {"cluster", "page_options", "provision_levels", "surroundings", "uncertain_inputs"},
         {"workers"},
         {"fenestration", "cost"},
         {"head", "input_options", "bsdf_generation"},
