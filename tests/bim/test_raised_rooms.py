@@ -64,7 +64,10 @@ def test_void_above_a_drawn_ceiling_is_not_the_room(tmp_path, short):
 def test_ceiling_that_nobody_drew_is_assumed_where_little_would_be_won(tmp_path):
     building = read(tmp_path, box_model(space_height=2.0)[0])
     assert building.spaces[0].raised == 0.0
-    assert said(building) == "it is kept as drawn, because the 1.00 m above it may be the void of a ceiling that is not drawn"
+    assert (
+        said(building)
+        == "it is kept as drawn, because the 1.00 m above it may be the void of a ceiling that is not drawn"
+    )
     assert building.account.low == ("R1 Room",)
 
 
