@@ -26,8 +26,10 @@ def test_page_works_in_a_browser(page, tmp_path, width, flags) -> None:
     found = inspect(page, tmp_path, *flags, width=width)
     assert found["faults"] == []
     assert found["scroll"] <= found["width"], "the page scrolls sideways"
-    # orientation, two rooms, 3D view; the second room's year of glare, shading state and loads
-    assert len(found["figures"]) == 1 + 2 * (5 + 1 + 5 + 6) + 1 + 3
+    # orientation, two rooms, 3D view; the second room's year of glare, shading state and loads; it is cooled, so
+    # that it has no adaptive comfort
+    assert len(found["figures"]) == 1 + 2 * (5 + 1 + 5 + 6) + 1 + 3 - 1
+    assert [name for name, *_ in found["figures"]].count("Adaptive comfort") == 1
     for name, *sizes in found["figures"]:
         assert sizes, f"{name} shows nothing"
         assert all(w >= 100 and h >= 90 for w, h in sizes), f"{name}: {sizes}"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from bim.ifc.building import read_ifc
-from bim.report.issue import Effect, Issue
+from bim.report.issue import Effect, Issue, Phrase
 from scenes.report.checked import check_record
 from tests.bim.test_joining import two_rooms
 from tests.report.synthetic import run_result
@@ -64,7 +64,8 @@ def test_the_gravest_reason_comes_first_and_equal_ones_are_one() -> None:
 def test_the_volume_is_that_of_the_computation_and_a_large_cut_is_doubtful() -> None:
     model = building()
     volume = model.spaces[0].volume
-    cut = Issue("room-cut", model.spaces[0].guid, dict.fromkeys(("room", "top", "bottom", "before", "after"), 1.0))
+    values = {"room": "A", "before": 1.5 * volume, "after": volume, "beyond": Phrase("beyond-slope")}
+    cut = Issue("room-cut", model.spaces[0].guid, values)
     found = of_room(model, cut, cut=0.5 * volume, room_volume=volume)
     assert found["volume_m3"] == pytest.approx(volume, abs=0.01)
     assert found["drawn_volume_m3"] == pytest.approx(1.5 * volume, abs=0.01) and found["doubt"] == "serious"
