@@ -22,6 +22,7 @@ from scenes.fenestration.peaks import peak_note
 from scenes.fenestration.resolver import source_notes, window_sources
 from scenes.fenestration.systems import FenestrationSystem, States
 from scenes.fenestration.thermal_system import thermal_system
+from scenes.language.catalogue import N_
 from scenes.toml_file import validated
 
 # Labels of the issues in a head, by severity, the gravest first; "info" changes nothing
@@ -35,6 +36,10 @@ TREES = "trees-by-month"
 NOTED = ("rooms-joined-by-size", TREES)  # codes of issues that are notes of a result's pages
 SHOWN = 8  # kinds of issues of a severity that a head lists; of what is left out it lists all
 FAR_SITE_DEG = 2.0  # a weather station further than this from the building's site is reported
+FAR_SITE = N_(  # template of that note
+    "The site of the building ({building}) is far from the weather station {station} ({position}); "
+    "the solar positions are those of the weather station."
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,8 +310,7 @@ def site_notes(building: Building, weather: Weather) -> tuple[str, ...]:
     if max(abs(north), abs(east)) <= FAR_SITE_DEG:
         return ()
     note = Note(
-        "The site of the building ({building}) is far from the weather station {station} ({position}); "
-        "the solar positions are those of the weather station.",
+        FAR_SITE,
         building=position_words(building.latitude_deg, building.longitude_deg),
         station=weather.site,
         position=position_words(weather.latitude_deg, weather.longitude_deg),

@@ -111,18 +111,10 @@ def _print_outcome(design: Design, results: Mapping[str, DesignResult], out: Pat
     every = list(results.values())
     for sentence in answer(every[0]) if design.search.each is None else answers(results):
         click.echo(sentence)
-    searched, full, cases, reused, seconds = (
-        sum(map(count, every))
-        for count in (
-            lambda one: len(one.searched),
-            lambda one: len(one.ranked),
-            lambda one: one.cases,
-            lambda one: one.reused,
-            lambda one: one.seconds,
-        )
-    )
+    searched, full = sum(len(one.searched) for one in every), sum(len(one.ranked) for one in every)
+    cases, reused = sum(one.cases for one in every), sum(one.reused for one in every)
     click.echo(
-        f"{searched} candidates, {full} in full; {cases} cases, {reused} from an earlier run, {seconds:.0f} s; "
-        f"table: {out / 'results.parquet'}"
+        f"{searched} candidates, {full} in full; {cases} cases, {reused} from an earlier run, "
+        f"{sum(one.seconds for one in every):.0f} s; table: {out / 'results.parquet'}"
     )
     click.echo(f"report: {out / 'report.html'}")

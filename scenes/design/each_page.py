@@ -4,25 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import metadata
 from pathlib import Path
-
-from markupsafe import Markup
 
 from mitsuba_cfs.files import write_text
 from scenes.design.assessment import Assessment
 from scenes.design.design import DesignResult
 from scenes.design.design_file import Design
 from scenes.design.each import folder_of
-from scenes.design.page import FILES, differences, equal_within_errors, failures
+from scenes.design.page import FILES, differences, equal_within_errors, failures, frame
 from scenes.language.catalogue import N_, gettext, in_language
-from scenes.language.numbers import cell, inside, listed, rounded, significant
+from scenes.language.numbers import cell, inside, listed, significant
 from scenes.page_options import OWN_PAGE, PageOptions
 from scenes.report import page as run_page
 from scenes.report.tables import Column, Table
 from scenes.result_folder import REPORT
 from scenes.study.study import facing
-from scenes.study_report.page import FILES as STUDY_FILES
 
 PARTS = {"orientation": N_("Orientation"), "room": N_("Room"), "climate": N_("Climate")}
 
@@ -50,15 +46,10 @@ def each_report_html(design: Design, results: Mapping[str, DesignResult], page: 
             run_page.environment(FILES)
             .get_template("each.html.j2")
             .render(
-                page=page,
-                title=page.title or design.title or gettext("Design of a fenestration system"),
-                facts=_facts(design, results) + page.facts,
+                **frame(design, list(results.values()), page),
                 answer=answers(results),
                 table=each_table(design, results),
                 links=[PartLink(name, f"{folder_of(design, number)}/{REPORT}") for number, name in enumerate(names, 1)],
-                version=metadata.version("mitsuba-cfs"),
-                style=Markup("\n".join((run_page.FILES["style.css"], STUDY_FILES["study.css"], FILES["design.css"]))),
-                scripts=Markup("\n".join(run_page.FILES[name] for name in run_page.SCRIPTS)),
             )
         )
 
@@ -130,18 +121,6 @@ def _sure(result: DesignResult) -> str:
     if equal_within_errors(apart):
         return gettext("equal within the errors")
     return gettext("more than twice the standard error")
-
-
-def _facts(design: Design, results: Mapping[str, DesignResult]) -> tuple[tuple[str, str], ...]:
-    every = results.values()
-    searched, full = (sum(len(getattr(one, key)) for one in every) for key in ("searched", "ranked"))
-    return (
-        (gettext("Variables"), str(len(design.variable))),
-        (gettext("Objectives"), ", ".join(inside(gettext(one.measure.label)) for one in design.objective)),
-        (gettext("Candidates"), gettext("{searched}, of which {full} in full", searched=searched, full=full)),
-        (gettext("Cases"), str(sum(one.cases for one in every))),
-        (gettext("Computing time"), f"{rounded(sum(one.seconds for one in every), 0)} s"),
-    )
 
 
 def _names(results: Mapping[str, DesignResult]) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from markupsafe import Markup
@@ -44,15 +45,12 @@ def write_front_report(result: DesignResult, path: Path, page: PageOptions = OWN
 def design_report_html(result: DesignResult, page: PageOptions = OWN_PAGE) -> str:
     """The page as text: no script, font or picture is fetched from anywhere."""
     design = result.design
-    scripts = [run_page.FILES[name] for name in run_page.SCRIPTS]
     with in_language(page.language):
         return (
             run_page.environment(FILES)
             .get_template("design.html.j2")
             .render(
-                page=page,
-                title=page.title or design.title or gettext("Design of a fenestration system"),
-                facts=_facts(result) + page.facts,
+                **frame(design, [result], page),
                 answer=answer(result),
                 certainty=certainty(result),
                 charts=trade_offs(result),
@@ -61,12 +59,22 @@ def design_report_html(result: DesignResult, page: PageOptions = OWN_PAGE) -> st
                 searched=_searched(result),
                 head=run_page.head_lines(result.of_best.head, result.of_best.notes),
                 inputs=inputs_table(result.of_best),
-                version=metadata.version("mitsuba-cfs"),
                 cases=FRONT,
-                style=Markup("\n".join((run_page.FILES["style.css"], STUDY_FILES["study.css"], FILES["design.css"]))),
-                scripts=Markup("\n".join(scripts)),
             )
         )
+
+
+def frame(design: Design, results: Sequence[DesignResult], page: PageOptions) -> dict[str, Any]:
+    """What a template has of every page of designs: title, facts, style and scripts."""
+    styles = run_page.FILES["style.css"], STUDY_FILES["study.css"], FILES["design.css"]
+    return {
+        "page": page,
+        "title": page.title or design.title or gettext("Design of a fenestration system"),
+        "facts": _facts(design, results) + page.facts,
+        "version": metadata.version("mitsuba-cfs"),
+        "style": Markup("\n".join(styles)),
+        "scripts": Markup("\n".join(run_page.FILES[name] for name in run_page.SCRIPTS)),
+    }
 
 
 def answer(result: DesignResult) -> tuple[str, ...]:
@@ -335,18 +343,15 @@ def _searched(result: DesignResult) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _facts(result: DesignResult) -> tuple[tuple[str, str], ...]:
-    design = result.design
+def _facts(design: Design, results: Sequence[DesignResult]) -> tuple[tuple[str, str], ...]:
     names = [gettext(one.measure.label) for one in design.objective]
+    searched, full = sum(len(one.searched) for one in results), sum(len(one.ranked) for one in results)
     return (
         (gettext("Variables"), str(len(design.variable))),
         (gettext("Objectives"), ", ".join(inside(name) for name in names)),
-        (
-            gettext("Candidates"),
-            gettext("{searched}, of which {full} in full", searched=len(result.searched), full=len(result.ranked)),
-        ),
-        (gettext("Cases"), str(result.cases)),
-        (gettext("Computing time"), f"{rounded(result.seconds, 0)} s"),
+        (gettext("Candidates"), gettext("{searched}, of which {full} in full", searched=searched, full=full)),
+        (gettext("Cases"), str(sum(one.cases for one in results))),
+        (gettext("Computing time"), f"{rounded(sum(one.seconds for one in results), 0)} s"),
     )
 
 

@@ -183,12 +183,12 @@ def _alone(room: Judged) -> str:
 
 
 def _names(cards: Sequence[Card]) -> str:
-    return listed([_named(card) for card in cards])
+    return listed([with_standard(inside(card.label), card) for card in cards])
 
 
-def _named(card: Card) -> str:
-    """A figure and its standard."""
-    return f"{inside(card.label)} ({card.standard})" if card.standard else inside(card.label)
+def with_standard(label: str, card: Card) -> str:
+    """The label of a figure with the standard that limits it."""
+    return f"{label} ({card.standard})" if card.standard else label
 
 
 def _values(cards: Sequence[Card]) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 from mitsuba_cfs.glare.classes import mean_error
 from scenes.language.catalogue import N_, gettext, translated
 from scenes.language.numbers import rounded, share
+from scenes.report.headline import moves
 from scenes.results import RunResult
 
 METHODS = {"three-phase": N_("three-phase"), "five-phase": N_("five-phase"), "point-in-time": N_("point-in-time")}
@@ -176,7 +177,7 @@ def _sources(result: RunResult) -> str:
 
 
 def _moved(result: RunResult) -> bool:
-    return any(room.operation is not None and len(room.operation.states) > 1 for room in result.spaces)
+    return any(map(moves, result.spaces))
 
 
 def _glare(result: RunResult) -> str:

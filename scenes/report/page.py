@@ -20,7 +20,7 @@ from bim.model import Building
 from mitsuba_cfs.files import json_text, write_text
 from mitsuba_cfs.notes import Note
 from scenes.figures.plan import plan_frame, window_from_above
-from scenes.head import Head
+from scenes.head import FAR_SITE, Head
 from scenes.language.catalogue import N_, gettext, in_language, ngettext, translated
 from scenes.language.numbers import cell, colon, day_and_month, rounded, semicolons
 from scenes.page_options import OWN_PAGE, PageOptions
@@ -166,7 +166,6 @@ UNIT_AFTER_NUMBER = re.compile(r"(\d) (°C|%|lx|h|m²|m³|kWh|cd/m²)(?!\w)")
 OPTION = re.compile(r"(?<!\w)--[a-z][\w-]*")
 UNIT_EXPONENT = re.compile(r"(?<![\w.-])(k?m|cm|mm)([23])(?![\w.-])")
 EXPONENTS = {"2": "²", "3": "³"}
-FAR_SITE = re.compile(r"The site of the building \(\{building\}\) is far from the weather station")
 SCRIPTS = ("tables.js", "pointer.js", "viewer.js", "storeys.js")
 SAVING = "figures.js"  # of pages with figures to save
 
@@ -320,7 +319,7 @@ def summary(result: RunResult) -> tuple[tuple[str, str], ...]:
             gettext("{degrees}° N", degrees=latitude) if north >= 0 else gettext("{degrees}° S", degrees=latitude),
             gettext("{degrees}° E", degrees=longitude) if east >= 0 else gettext("{degrees}° W", degrees=longitude),
         )
-        far = any(isinstance(note, Note) and FAR_SITE.match(note.template) for note in result.head.assumed)
+        far = any(isinstance(note, Note) and note.template == FAR_SITE for note in result.head.assumed)
         parts = (*place, *([gettext("far from the weather station, whose sun is used")] if far else []))
         rows.append((gettext("Site of the building"), semicolons(parts)))
     manifest = result.manifest

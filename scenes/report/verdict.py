@@ -14,9 +14,9 @@ from mitsuba_cfs.glare.indices import DGP_IN_DARK, DGP_PER_LUX
 from mitsuba_cfs.notes import Note
 from scenes.language.catalogue import gettext, ngettext
 from scenes.language.numbers import colon, month_name, percent, rounded, semicolons, share, significant, spoken
-from scenes.report.answer import judged, rooms_answer
+from scenes.report.answer import judged, rooms_answer, with_standard
 from scenes.report.glare_figures import sun_words
-from scenes.report.headline import FAIR, GOOD, POOR, WARM_C, Card, dgp_error, heated, occupied
+from scenes.report.headline import FAIR, GOOD, POOR, WARM_C, Card, dgp_error, heated, moves, occupied
 from scenes.report.method import METHODS
 from scenes.report.names import rooms_counted, systems_counted
 from scenes.report.sensitivity import bands_sentence, sensitivity_sentence
@@ -58,7 +58,7 @@ def _every(rooms: Sequence[Named], of: str) -> Table:
         Column(gettext("Standard error"), numeric=False),
     )
     rows = tuple(
-        (name, _of_standard(card), _value(card), card.verdict, _error(room, card))
+        (name, with_standard(card.label, card), _value(card), card.verdict, _error(room, card))
         for name, room, own in rooms
         for card in own
         if card.verdict
@@ -81,13 +81,8 @@ def _by_figure(rooms: Sequence[Named]) -> Table:
         counts = Counter((GRADES.index(card.grade), card.verdict) for _, _, card in result)
         meets = semicolons([colon(str(counts[key]), key[1]) for key in sorted(counts)])
         worst = semicolons([colon(name, _value(card)) for name, _, card in result[:WORST]])
-        rows.append((_of_standard(result[0][2]), meets, worst, _error(*result[0][1:])))
+        rows.append((with_standard(label, result[0][2]), meets, worst, _error(*result[0][1:])))
     return Table(gettext("Results and limits of the standards"), columns, tuple(rows))
-
-
-def _of_standard(card: Card) -> str:
-    """A figure with the standard that limits it."""
-    return f"{card.label} ({card.standard})" if card.standard else card.label
 
 
 def _value(card: Card) -> str:
@@ -155,8 +150,7 @@ def verdict(result: RunResult, cards: Sequence[Sequence[Card]]) -> Verdict:
         *([(gettext("How sure"), bands)] if (bands := bands_sentence(result)) else []),
     )
     named = [(r.space.label, r, card) for r, card in zip(result.spaces, cards, strict=True)]
-    cases = [judged(name, figures) for name, _, figures in named]
-    answer = rooms_answer(cases)
+    answer = rooms_answer([judged(name, figures) for name, _, figures in named])
     answers = (("", answer),) if answer else ()
     return Verdict(question, answers, sentences, limits(named, gettext("Room")))
 
@@ -279,7 +273,7 @@ def _warm_hours(room: RoomYear) -> NDArray[np.bool_]:
 
 def _shading(result: RunResult) -> str:
     """Hours with the shading in use, and its effect on daylight autonomy."""
-    moved = [r for r in result.spaces if r.operation is not None and len(r.operation.states) > 1]
+    moved = [room for room in result.spaces if moves(room)]
     if not moved:
         return gettext("The shading does not move: all results are for one state.")
     drawn = [_drawn(room) for room in moved]
@@ -289,8 +283,7 @@ def _shading(result: RunResult) -> str:
         rows.sort(key=lambda one: -one[1])
         least, most, counted = percent(min(drawn)), percent(max(drawn)), rooms_counted(len(moved))
         if least == most:
-            equal = "{room}: the shading is in use in {share} % of the occupied daylight hours."
-            parts = [gettext(equal, room=counted, share=most)]
+            parts = [_in_use(counted, most)]
         else:
             parts = [
                 gettext(
@@ -320,10 +313,14 @@ def _drawn(room: RoomYear) -> float:
     return 100 * float((states[used] > 0).mean()) if used.any() else 0.0
 
 
+def _in_use(room: str, share: str) -> str:
+    return gettext("{room}: the shading is in use in {share} % of the occupied daylight hours.", room=room, share=share)
+
+
 def _shading_of(room: RoomYear, drawn: float, cost: tuple[float, float] | None) -> str:
     facts = {"room": room.space.label, "share": percent(drawn)}
     if cost is None:
-        return gettext("{room}: the shading is in use in {share} % of the occupied daylight hours.", **facts)
+        return _in_use(**facts)
     most, least = map(percent, cost)
     if most == least:
         return gettext(

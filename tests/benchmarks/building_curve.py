@@ -64,7 +64,7 @@ def _samples(factor: float) -> list[str]:
     return [part for name, count in counts.items() for part in ("--set", f"{name}={round(count * factor)}")]
 
 
-OURS = {
+RUNS = {
     "--quick, samples / 8": [*PREVIEW, *_samples(1 / 8)],
     "--quick": PREVIEW,
     "--quick, samples x 8": [*PREVIEW, *_samples(8)],
@@ -283,7 +283,7 @@ def measured(
 def curve(building: Building, *, kept: bool = False) -> pd.DataFrame:
     """All runs with their times and errors; of those that are kept alone, with `kept`."""
     work: list[tuple[str, str, Callable[[Path], tuple[Light, float]]]] = []
-    work += [("cfs run", name, partial(of_run, building, options)) for name, options in OURS.items()]
+    work += [("cfs run", name, partial(of_run, building, options)) for name, options in RUNS.items()]
     work += [("rfluxmtx", name, partial(of_rfluxmtx, building, values)) for name, values in RFLUXMTX.items()]
     work += [("recipe", name, partial(of_recipe, building, recipe)) for name, recipe in RECIPES.items()]
     references = {
@@ -324,12 +324,12 @@ def yearly_error(light: NDArray[np.float64], reference: NDArray[np.float64]) -> 
 
 def ratios(table: pd.DataFrame) -> pd.DataFrame:
     """Of each run of a peer: the cheapest `cfs run` whose error is no larger, and the peer's times over its times."""
-    ours = table[table["program"] == "cfs run"]
+    of_cfs = table[table["program"] == "cfs run"]
     rows = []
     for _, peer in table[table["program"] != "cfs run"].iterrows():
         row = {"program": peer["program"], "settings": peer["settings"], "error %": peer["error %"]}
         for measure in ("processor s", "tracing s"):
-            reached = ours[ours["error %"] <= peer["error %"]].sort_values(measure)
+            reached = of_cfs[of_cfs["error %"] <= peer["error %"]].sort_values(measure)
             row[measure] = peer[measure] / reached[measure].iloc[0] if len(reached) else np.nan
             row[f"cfs run by {measure}"] = reached["settings"].iloc[0] if len(reached) else "none"
         rows.append(row)

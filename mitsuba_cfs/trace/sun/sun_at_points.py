@@ -39,10 +39,10 @@ class SunAtPoints:
         cosine = _cosines(places, suns)
         share = np.rint(light / np.where(cosine > SPREAD, cosine, np.float32(1)))
         share[(cosine <= SPREAD) | (np.abs(share) > MOST_SHARE)] = 0
-        alike = np.abs(light - share * cosine) <= ROUNDING * np.maximum(np.abs(share), 1)
-        alike &= (share != 0) | (light == 0)
-        share[~alike] = OTHER
-        return cls(share.astype(np.int8), light.T[~alike.T].astype(np.float32))
+        is_share = np.abs(light - share * cosine) <= ROUNDING * np.maximum(np.abs(share), 1)
+        is_share &= (share != 0) | (light == 0)
+        share[~is_share] = OTHER
+        return cls(share.astype(np.int8), light.T[~is_share.T].astype(np.float32))
 
     def light(
         self, places: SurfacePoints, suns: NDArray[np.float64], hours: slice = slice(None)
