@@ -184,11 +184,11 @@ def _checked(files: tuple[Path, ...], parsed: Study, out: Path, scheduler: str |
     from scenes.study.store import Store
     from scenes.workers import check_dask
 
-    store = Store(out, inputs=files, replacing=replacing())
-    default_folder()  # of the cache, or one line that it cannot be one
     if write_ifc is not None:
         check_file(write_ifc, field="--write-ifc", inputs=parsed.files)
         check_is_ifc(one_building(room.building for room in parsed.room), "--write-ifc")
+    store = Store(out, inputs=files, replacing=replacing())
+    default_folder()  # of the cache, or one line that it cannot be one
     if scheduler is not None:
         check_dask()
     check_files(parsed)

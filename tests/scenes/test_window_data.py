@@ -343,4 +343,8 @@ def test_the_errors_that_a_result_names_are_those_of_the_docs():
 
 
 def test_reads_a_plain_file_as_before():
-    assert read_system(BLIND).closure.u_model == "typical"
+    system = read_system(BLIND)
+    assert system.closure is None
+    heat, by_name = thermal_system(system), thermal_system(replace(system, closure=Closure("typical")))
+    assert heat.model == by_name.model
+    assert heat.fenestration == by_name.fenestration
