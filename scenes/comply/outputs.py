@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from importlib import metadata
 from importlib.resources import files
 from pathlib import Path
@@ -38,7 +37,7 @@ from scenes.quick import NOTE
 from scenes.report.glare_figures import compass, glare_plan
 from scenes.report.names import stage_words
 from scenes.report.page import FILES as SHARED
-from scenes.report.page import environment, head_lines, prose
+from scenes.report.page import environment, head_lines
 from scenes.report.page_files import page_files
 from scenes.report.room import RoomSection, facts
 from scenes.report.tables import Table, problems_table
@@ -321,11 +320,6 @@ def sun_bars(result: Compliance, room: CheckedRoom) -> Chart | None:
 
 
 FILES = page_files("scenes.comply")
-# what does not come apart at the end of a line: a sign and its number, a number and what it counts
-TOGETHER = re.compile(
-    r"(?<=[≥≤]) (?=\d)|(?<=\d) (?=%|°|lx|h\b|m\b|s\b|K h\b|kWh|points?\b|credits?\b)"
-    r"|(?<=\bK) (?=h\b)"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -366,16 +360,16 @@ def _filled(result: Compliance, *, quick: bool, page: PageOptions) -> str:
             page=page,
             title=page.title or result.building.name or gettext("Building"),
             facts=summary(result) + page.facts,
-            answers=[(title, tied(text)) for title, text in answers(result)],
+            answers=answers(result),
             quick=gettext(NOTE) if quick else "",
             notes=head_lines(result.head, result.notes),
             assumptions=[translated(text) for text in result.assumptions],
             settings=[translated(text) for text in result.settings],
             rules=[dossier_rule(result, name) for name in result.rules],
             rooms=rooms,
-            problems=tied_table(problems_table(result.issues)),
+            problems=problems_table(result.issues),
             version=metadata.version("mitsuba-cfs"),
-            seconds=tied(_seconds(result.seconds)),
+            seconds=_seconds(result.seconds),
             style=Markup("\n".join(style)),
         )
     )
@@ -390,21 +384,21 @@ def dossier_rule(result: Compliance, name: str) -> DossierRule:
     """Tables of a rule."""
     return DossierRule(
         result.rules[name],
-        tied_table(tables.building_table(result, name)),
-        tied_table(tables.rooms_table(result, name)),
+        tables.building_table(result, name),
+        tables.rooms_table(result, name),
         tables.without_rooms(result, name),
     )
 
 
 def dossier_room(result: Compliance, room: CheckedRoom, number: int) -> DossierRoom:
     """Tables and drawings of a room."""
-    room_tables = [tied_table(tables.room_table(result, room, name)) for name in result.rules]
+    room_tables = [tables.room_table(result, room, name) for name in result.rules]
     return DossierRoom(
         f"room-{number}",
         gettext("Room {room}", room=room.space.label),
         room_facts(room),
         plans(result, room),
-        tuple(map(tied, tables.missed(result.rules, room))),
+        tuple(tables.missed(result.rules, room)),
         tuple(table for table in room_tables if table.rows),
         sun_bars(result, room),
         tables.openings_table(room, result.building),
@@ -501,17 +495,6 @@ def _map_words(glare: SeatGlare) -> str:
         return semicolons([where, gettext("decided by the map")])
     rated = ngettext("{count} hour rated by pictures", "{count} hours rated by pictures", hours)
     return semicolons([where, rated])
-
-
-def tied(text: str) -> str:
-    """A text whose numbers stay with their signs and units at the end of a line."""
-    return TOGETHER.sub("\N{NO-BREAK SPACE}", prose(text))
-
-
-def tied_table(table: Table) -> Table:
-    """A table with all its cells `tied`."""
-    rows = tuple(tuple(tied(cell) for cell in row) for row in table.rows)
-    return replace(table, rows=rows)
 
 
 def summary(result: Compliance) -> tuple[tuple[str, str], ...]:

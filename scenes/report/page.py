@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import base64
-import re
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import jinja2
 import numpy as np
 import shapely
-from markupsafe import Markup, escape
+from markupsafe import Markup
 from numpy.typing import ArrayLike, NDArray
 
 from bim.model import Building
@@ -32,6 +31,7 @@ from scenes.report.names import glossary, option_words, stage_words
 from scenes.report.page_files import page_files
 from scenes.report.room import room_page
 from scenes.report.storeys import RoomMetric, room_metrics, storey_plans
+from scenes.report.typography import prose, tied
 from scenes.report.verdict import verdict
 from scenes.results import RunResult
 from scenes.surroundings import NO_SURROUNDINGS, has_surroundings
@@ -162,10 +162,6 @@ def _text(style: str, x: float, y: float, text: str) -> str:
 
 
 FILES = page_files("scenes.report")  # that other pages share
-UNIT_AFTER_NUMBER = re.compile(r"(\d) (°C|%|lx|h|m²|m³|kWh|cd/m²)(?!\w)")
-OPTION = re.compile(r"(?<!\w)--[a-z][\w-]*")
-UNIT_EXPONENT = re.compile(r"(?<![\w.-])(k?m|cm|mm)([23])(?![\w.-])")
-EXPONENTS = {"2": "²", "3": "³"}
 SCRIPTS = ("tables.js", "pointer.js", "viewer.js", "storeys.js")
 SAVING = "figures.js"  # of pages with figures to save
 
@@ -188,7 +184,6 @@ def write_check(building: Building, head: Sequence[str], path: Path, before: Bui
 
     Args: head: its first lines; before: the same file without its corrections.
     """
-    problems = tables.problems_table(building.issues)
     text = (
         environment()
         .get_template("check.html.j2")
@@ -197,7 +192,7 @@ def write_check(building: Building, head: Sequence[str], path: Path, before: Bui
             title=building.name or gettext("Building"),
             head=head,
             model=checked_model(building, before),
-            problems=replace(problems, rows=tuple(tuple(map(prose, row)) for row in problems.rows)),
+            problems=tables.problems_table(building.issues),
             style=Markup(FILES["style.css"]),
             scripts=Markup("\n".join(FILES[name] for name in SCRIPTS[:-1])),
         )
@@ -282,17 +277,6 @@ def environment(own: Mapping[str, str] | None = None) -> jinja2.Environment:
 def headed(text: object) -> str:
     """A heading with the page's colon after it."""
     return colon(str(text), "").rstrip(" ")
-
-
-def tied(text: str) -> Markup:
-    """`prose`, whose options such as --quick are not broken at the end of a line."""
-    return Markup(OPTION.sub(r'<span class="option">\g<0></span>', str(escape(prose(text)))))
-
-
-def prose(text: str) -> str:
-    """A sentence as it is printed: numbers stay with their units, "W/(m2 K)" is "W/(m² K)"."""
-    text = UNIT_EXPONENT.sub(lambda found: found[1] + EXPONENTS[found[2]], text)
-    return UNIT_AFTER_NUMBER.sub("\\1\u00a0\\2", text)
 
 
 def script_json(value: object) -> Markup:

@@ -29,7 +29,6 @@ from scenes.comply.outputs import (
     shortened,
     summary,
     sun_bars,
-    tied,
     write_compliance,
     write_into_ifc,
 )
@@ -40,6 +39,7 @@ from scenes.comply.uses import read_uses
 from scenes.demo import OFFICE, WEATHER
 from scenes.input_files import InputFiles, read_building, read_weather
 from scenes.page_options import PageOptions
+from scenes.report.typography import tied
 from scenes.result_folder import ResultFolder
 from scenes.results import GlareMap
 from scenes.surroundings import has_surroundings

@@ -18,7 +18,9 @@ from bim.report.issue import Effect, Issue, issue_text
 from scenes.report.glare_figures import gallery
 from scenes.report.headline import cooled
 from scenes.report.names import option_words
-from scenes.report.page import options_table, remaining, report_html, tied, write_report
+from scenes.report.page import environment, options_table, remaining, report_html, write_report
+from scenes.report.tables import Column, Table
+from scenes.report.typography import tied
 from scenes.results import GlareResults
 from scenes.run.options import JobOptions
 from tests.report.synthetic import run_result
@@ -225,3 +227,7 @@ def test_options_of_a_command_are_not_broken_at_the_end_of_a_line() -> None:
     text = tied("run without --quick, for 5 m2 of <glass>")
     assert '<span class="option">--quick</span>, for 5\N{NO-BREAK SPACE}m²' in text
     assert "&lt;glass&gt;" in text
+    assert '<span class="option">LM-83</span>, EN\N{NO-BREAK SPACE}17037' in tied("LM-83, EN 17037")
+    table = Table("Of the code", (Column("Rule"),), (("EN 17037, 5 m2",),))
+    html = environment().from_string('{% from "macros.html.j2" import table %}{{ table(t) }}').render(t=table)
+    assert ">EN\N{NO-BREAK SPACE}17037, 5\N{NO-BREAK SPACE}m²</td>" in html, "in tables too"

@@ -23,7 +23,8 @@ from scenes.input_options import InputOptions
 from scenes.inputs import read_inputs
 from scenes.language.catalogue import in_language
 from scenes.page_options import PageOptions
-from scenes.report.page import head_lines, prose, report_html
+from scenes.report.page import head_lines, report_html
+from scenes.report.typography import prose
 from scenes.study_report.page import study_report_html
 from tests.bim.honeybee_models import two_rooms, write
 from tests.bim.small_ifc import box_model

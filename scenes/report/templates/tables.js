@@ -1,7 +1,7 @@
 // Tables: sort by a click on a heading, copy as tab-separated text for a spreadsheet.
 (() => {
   "use strict";
-  const text = (cell) => cell.textContent.trim();
+  const text = (cell) => cell.textContent.trim().replaceAll("\u00a0", " ");
   const number = (s) => (s === "" || s === "–" ? NaN : Number(s.replace(/\u202f/g, "").replace("−", "-").replace(",", ".")));
   function sort(table, column, th) {
     const down = th.getAttribute("aria-sort") === "ascending";
