@@ -165,7 +165,7 @@ def assumed_ground_note(building: Building) -> tuple[str, ...]:
         return ()
     note = Note(
         "Floors on the ground without [envelope.ground] are computed by ISO 13370 with {area:.0f} m2 and "
-        "{perimeter:.0f} m of outer walls of the building's rooms, walls of 0.3 m, on sand (2 W/mK), "
+        "{perimeter:.0f} m of outer walls of the building's rooms, walls of 0.3 m, on sand (2 W/(m K)), "
         "without edge insulation.",
         area=area,
         perimeter=perimeter,
