@@ -117,7 +117,7 @@ def reflections(points: Path, reflectance: float, out: Path, **chosen: Any) -> N
     mirrors, sun = mirrors_of(building, reflectance), sun_year(weather)
     tables = {observer.name: reflected(observer, mirrors, sun) for observer in observers}
     rows = pd.DataFrame([observer_row(one, tables[one.name], sun.step_h) for one in observers])
-    moments = pd.concat([t.assign(point=name) for name, t in tables.items() if len(t)] or [pd.DataFrame()])
+    moments = pd.concat([t.assign(point=name) for name, t in tables.items()])
     record = {"head": head.record, "points": str(points), "reflectance": reflectance}
     _write(folder, record, {"points.csv": rows, "moments.csv": moments})
     for row in rows.to_dict("records"):
@@ -167,5 +167,6 @@ def _building(options: InputOptions) -> tuple[Building, PrintedHead]:
 def _write(results: ResultFolder, record: dict[str, Any], tables: dict[str, pd.DataFrame]) -> None:
     with results.replaced() as folder:
         for name, table in tables.items():
-            write_table(table.round(3), folder / name, index=False)
+            digits = dict.fromkeys(table.select_dtypes("number"), 3)  # moments have their times, too
+            write_table(table.round(digits), folder / name, index=False)
         write_text(folder / "run.json", json_text(record, indent=2) + "\n")

@@ -86,13 +86,18 @@ def read_observers(file: str | PathLike[str]) -> list[Observer]:
 
 
 def mirrors_of(building: Building, reflectance: float) -> Mirrors:
-    """The exterior panes of all rooms, those of one direction together."""
+    """The exterior panes of all rooms, those of one direction together.
+
+    Raises: `DataError` for a building without any.
+    """
     by_normal: dict[tuple[float, ...], list[tuple[FloatArray, str]]] = {}
     for space in building.spaces:
         for window in space.windows:
             key = tuple(np.round(window.normal, SAME_PLANE) + 0.0)
             name = f"{space.label}: {window.name or window.guid}"
             by_normal.setdefault(key, []).append((window.triangles, name))
+    if not by_normal:
+        raise DataError("no room has an exterior window", element=building.name or None)
     planes = []
     for normal, parts in by_normal.items():
         names = tuple(name for triangles, name in parts for _ in triangles)
@@ -140,22 +145,21 @@ def reflections(observer: Observer, mirrors: Mirrors, sun: SunYear) -> pd.DataFr
         if observer.sight is not None:
             table["from_sight_deg"] = np.degrees(np.arccos(np.clip(rays @ observer.sight, -1, 1)))
         found.append(table)
-    whole = pd.concat(found, ignore_index=True) if found else pd.DataFrame()
-    return whole.sort_values(["time", "lux"]).reset_index(drop=True) if len(whole) else whole
+    return pd.concat(found, ignore_index=True).sort_values(["time", "lux"]).reset_index(drop=True)
 
 
 def observer_row(observer: Observer, table: pd.DataFrame, step_h: float) -> dict[str, Any]:
     """The year of a point: hours, longest day, brightest moment; hours of one moment count once."""
     row: dict[str, Any] = {"point": observer.name}
-    for name, part in (("cloudless", table), ("weather", table[table["shines"]] if len(table) else table)):
-        times = part["time"].drop_duplicates() if len(part) else pd.Series(dtype="datetime64[ns]")
+    for name, part in (("cloudless", table), ("weather", table[table["shines"]])):
+        times = part["time"].drop_duplicates()
         row[f"hours_{name}"] = step_h * len(times)
         row[f"longest_day_min_{name}"] = 60 * step_h * int(times.dt.date.value_counts().max()) if len(times) else 0.0
-    far = table[table["apart_from_sun_deg"] >= APART_DEG] if len(table) else table
-    row["hours_cloudless_apart_10_deg"] = step_h * (far["time"].nunique() if len(far) else 0)
+    far = table[table["apart_from_sun_deg"] >= APART_DEG]
+    row["hours_cloudless_apart_10_deg"] = step_h * far["time"].nunique()
     if observer.sight is not None:
-        near = table[table["from_sight_deg"] <= BESIDE_DEG] if len(table) else table
-        row["hours_cloudless_within_30_deg_of_sight"] = step_h * (near["time"].nunique() if len(near) else 0)
+        near = table[table["from_sight_deg"] <= BESIDE_DEG]
+        row["hours_cloudless_within_30_deg_of_sight"] = step_h * near["time"].nunique()
     if len(table):
         worst = table.iloc[int(table["lux"].to_numpy().argmax())]
         for key in ("lux", "luminance_cd_m2", "time", "window", "azimuth_deg", "altitude_deg"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -10,7 +11,9 @@ import pytest
 
 from bim.shoebox import shoebox
 from mitsuba_cfs.errors import DataError
+from scenes import cli
 from scenes.comply.openings import openings_of
+from scenes.demo import OFFICE, WEATHER
 from scenes.site.reflections import Observer, mirrors_of, observer_row, read_observers, reflections
 from scenes.site.sun_year import SunYear
 from tests.comply.obstructions import facing_wall
@@ -91,3 +94,20 @@ def test_points_may_state_a_line_of_sight(tmp_path):
     file.write_text("name,x,y,z,sight_azimuth_deg\ndriver,1,2,1.5,90\nwindow,0,0,5,\n")
     driver, window = read_observers(file)
     assert driver.sight == pytest.approx([1.0, 0.0, 0.0], abs=1e-12) and window.sight is None
+
+
+@pytest.mark.parametrize(("z", "reached"), [(0.2, True), (40.0, False)])
+def test_the_command_writes_moments_with_their_times(tmp_path: Path, z: float, reached: bool) -> None:
+    """To an eye below the window, and to one above, whom no pane shows the sun: the table has its head, too."""
+    (tmp_path / "street.csv").write_text(f"name,x,y,z,sight_azimuth_deg\nopposite,2,-3,{z},\n")
+    words = ["--weather", WEATHER, "--points", tmp_path / "street.csv", "--out", tmp_path / "out"]
+    assert cli.run([str(word) for word in ("site", "reflections", OFFICE, *words)]) == 0
+    moments = pd.read_csv(tmp_path / "out" / "moments.csv")
+    assert (len(moments) > 0) == reached and set(moments["time"].str[:4]) == ({"2017"} if reached else set())
+
+
+def test_a_building_without_windows_is_refused() -> None:
+    bare = shoebox()
+    bare = replace(bare, spaces=tuple(replace(space, windows=()) for space in bare.spaces))
+    with pytest.raises(DataError, match="no room has an exterior window"):
+        mirrors_of(bare, 0.15)
