@@ -11,7 +11,8 @@ EXPONENTS = {"2": "²", "3": "³"}
 # a sign and its number, a number and what it counts, a standard and its number
 TOGETHER = re.compile(
     r"(?<=[≥≤]) (?=\d)|(?<=\d) (?=%|°|lx\b|h\b|m\b|m²|m³|s\b|K h\b|kWh|cd/m²|points?\b|credits?\b)"
-    r"|(?<=\bK) (?=h\b)|(?<=\bEN) (?=ISO \d|\d)|(?<=\bISO) (?=\d)|(?<=\bDIN) (?=EN \d|V? ?\d)|(?<=\bVDI) (?=\d)"
+    r"|(?<=\bK) (?=h\b)|(?<=\(m) (?=K\b)|(?<=\(m²) (?=K\b)"
+    r"|(?:(?<=\bEN)|(?<=\bDIN)) (?=ISO \d|EN \d|V \d|\d)|(?<=\b(?:ISO|VDI)) (?=\d)"
 )
 UNBROKEN = re.compile(r"(?<!\w)--[a-z][\w-]*|\bLM-\d+(?:-\d+)?")  # a hyphen may end a line, but not these
 

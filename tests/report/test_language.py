@@ -95,6 +95,7 @@ def marked(result):
 
 def shown(page: str) -> list[str]:
     """Text that a reader sees or hears: of elements, labels, titles and alternatives."""
+    page = page.replace("\N{NO-BREAK SPACE}", " ")  # between what stays on one line
     page = re.sub(r"<(script|style)\b.*?</\1>", "", page, flags=re.DOTALL)
     page = re.sub(r"""<span class="option">([^<]*)</span>""", r"\1", page)  # kept on one line
     said = re.findall(r"""\b(?:aria-label|title|alt)="([^"]*)\"""", page)
