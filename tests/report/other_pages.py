@@ -10,6 +10,8 @@ import pandas as pd
 from bim.ifc.building import read_ifc
 from scenes.design.design import run_design
 from scenes.design.design_file import read_design
+from scenes.design.each import run_each
+from scenes.design.each_page import write_each_report
 from scenes.design.page import design_report_html
 from scenes.fit.estimate import FittedValues, ReadingNoise
 from scenes.fit.fit import FitResult
@@ -35,6 +37,15 @@ def write_design_page(folder: Path) -> Path:
     result = run_design(design, folder / "out", compute=by_formula)
     (folder / "design.html").write_text(design_report_html(result), encoding="utf-8")
     return folder / "design.html"
+
+
+def write_each_page(folder: Path) -> Path:
+    """The same for each of two orientations."""
+    search = SEARCH + 'each = "orientation"\nmethod = "all"\n'
+    head = "orientations_deg = [0, 90]\n"
+    design = read_design(design_file(folder, PLAIN, WIDTH, COOLING, ENERGY, search, head=head))
+    write_each_report(design, run_each(design, folder / "each", compute=by_formula), folder / "each.html")
+    return folder / "each.html"
 
 
 def write_fit_page(folder: Path) -> Path:

@@ -24,7 +24,7 @@ from tests.comply.test_outputs import RULE, files_of
 from tests.devtools import Page, chromium
 from tests.explore.synthetic import explored_run
 from tests.report.building_page import building
-from tests.report.other_pages import write_check_page, write_design_page, write_fit_page
+from tests.report.other_pages import write_check_page, write_design_page, write_each_page, write_fit_page
 from tests.report.synthetic import run_result
 from tests.report.test_glare_page import write_glare_page
 from tests.report.test_study_explorer import with_explored
@@ -71,6 +71,7 @@ def pages(tmp_path_factory) -> dict[str, Path]:
     write_glare_page(folder / "glare.html")
     files = {name: folder / f"{name}.html" for name in (*texts, "glare")}
     files |= {"check": write_check_page(folder), "fit": write_fit_page(folder), "design": write_design_page(folder)}
+    files["each"] = write_each_page(folder)
     return files | {"explorer": folder / "explorer" / "index.html"}
 
 
@@ -114,7 +115,7 @@ def test_no_script_has_a_fault_and_nothing_is_wider_than_the_window(pages, tmp_p
 def test_pages_without_rays_have_no_fault_at_all(pages, tmp_path) -> None:
     """Not even a moderate one: a skip link without its target, two landmarks of one name."""
     with Page(tmp_path) as page:
-        found = {name: faults(page, pages[name]) for name in ("check", "fit", "design", "glare", "explorer")}
+        found = {name: faults(page, pages[name]) for name in ("check", "fit", "design", "each", "glare", "explorer")}
     assert not {name: some for name, some in found.items() if some}
 
 
