@@ -536,8 +536,8 @@ class Check:
         asked = asked_year(inputs_of_room(*chosen, operation=self.operation, skies=skies, cache=cache))
         return asked.states[:, room.windows.control]
 
-    def _rule_words(self) -> Iterator[str]:
-        """Included and omitted parts of each rule; rules that ask for other weather."""
+    def _weather_words(self) -> Iterator[str]:
+        """Rules that ask for other weather."""
         weather = self.files.weather
         for rule in self.files.rules.values():
             if not rule.fits(weather):
@@ -555,10 +555,6 @@ class Check:
                     words=rule.header[0],
                     file=weather.site if weather.file is None else weather.file.name,
                 )
-            for sentence in rule.included:
-                yield Note("{rule}. Included: {what}", rule=Note(rule.title), what=Note(sentence))
-            for sentence in rule.left_out:
-                yield Note("{rule}. Left out: {what}", rule=Note(rule.title), what=Note(sentence))
         fitting = [rule for rule in self.files.rules.values() if rule.fits(weather)]
         yield from weekday_note([one.operation for rule in fitting for one in rule.setup], weather)
 
@@ -602,7 +598,7 @@ class Check:
 
     def assumptions(self, rooms: list[CheckedRoom], left: list[Space]) -> list[str]:
         """What was assumed, in sentences; `left` are rooms without a rule."""
-        found = [*self._rule_words(), *self._ray_words(), *self._light_words()]
+        found = [*self._weather_words(), *self._ray_words(), *self._light_words()]
         found += dwelling_words(rooms)
         if left:
             names = ", ".join(space.label for space in left)
@@ -616,6 +612,12 @@ class Check:
             )
             for room in rooms
             if room.use.assumed
+        ]
+        rules = self.files.rules.values()
+        found += [
+            Note("{rule}. Left out: {what}", rule=Note(rule.title), what=Note(sentence))
+            for rule in rules
+            for sentence in rule.left_out
         ]
         return found
 

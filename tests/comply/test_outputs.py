@@ -346,6 +346,14 @@ def test_openings_stand_in_the_axes_of_the_model_file(result):
     assert room.sun.openings[0].guid in row[0]
 
 
+def test_what_a_rule_includes_is_in_its_section_and_what_it_leaves_out_ends_the_assumptions(result):
+    rule = result.rules["rays"].model_copy(update={"included": ("A and b.",)})
+    html = dossier_html(replace(result, rules={"rays": rule}))
+    section = html.split('<section id="rule-1"')[1].split("</section>")[0]
+    assert "<h3>Included</h3>" in section and "<li>A and b.</li>" in section
+    assert "A and b." not in html.split('<section id="assumptions">')[1].split("</section>")[0]
+
+
 def test_a_model_without_surroundings_says_so(result):
     text = "\n".join(result.assumptions)
     assert "The model has no surroundings (neighbouring buildings, trees)" in text
@@ -496,7 +504,7 @@ def test_files_are_read_by_their_options(tmp_path):
 def test_a_dossier_prints_on_a4_with_units_as_they_are_written(result):
     """Notes and faults of a model are text of logs: "m2" there, "m²" on the page."""
     note = "U 1.2 W/(m2 K), 0.5 m3/h of air, 3 cm2; m2 of glass from room-m2.ifc and M2"
-    html = dossier_html(replace(result, notes=(note,)))
+    html = dossier_html(replace(result, notes=(note,))).replace("\N{NO-BREAK SPACE}", " ")
     assert "U 1.2 W/(m² K), 0.5" in html and "m³/h of air" in html and "3 cm²; m² of" in html
     assert "room-m2.ifc and M2" in html
     (page,) = re.findall(r"@page \{[^}]*size:[^}]*\}", html)
