@@ -44,6 +44,7 @@ from scenes.language.catalogue import gettext, in_language
 from scenes.report.names import quantity
 from scenes.report.page import FILES, environment
 from scenes.report.page_files import page_files
+from scenes.report.typography import prose
 from scenes.user_errors import user_message
 
 # Columns of `results.csv`; + where more is better, - where less is
@@ -416,7 +417,11 @@ class AppServer:
         path = self._project.folder / actions.CHECK
         if not path.is_file():
             return None
-        return await asyncio.to_thread(read_json, path)
+        check = await asyncio.to_thread(read_json, path)
+        check["head"] = [prose(line) for line in check["head"]]
+        for issue in check["issues"]:
+            issue |= {key: prose(issue[key]) for key in ("what", "effect")}
+        return check
 
     async def _rule_sets(self, _: Request) -> Any:
         if self._rules is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import time
 from pathlib import Path
@@ -80,6 +81,8 @@ def test_the_building_is_seen_and_a_room_is_chosen_in_the_view(browser, served) 
     assert name in ("A South office", "B East office")
     browser.until(f"{picture} !== {json.dumps(before)}")
     assert browser.value("document.querySelector('#room-rows tr.selected').innerText").find(name) > 0
+    told = browser.value("document.getElementById('building').innerText")
+    assert "m²" in told and re.search(r"\d m[23]\b", told) is None, "the check's lines are for a terminal"
 
 
 def test_a_fix_by_a_flag_is_told_as_one_of_the_command_line(browser) -> None:
