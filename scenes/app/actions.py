@@ -10,6 +10,7 @@ from typing import Any
 
 from bim.ifc.corrections import corrections_file
 from mitsuba_cfs.errors import DataError
+from mitsuba_cfs.files import read_json
 from scenes.app.project import INPUTS, PAGE, RESULTS, STUDY, USES, Project, slug
 from scenes.language.catalogue import gettext
 
@@ -134,10 +135,23 @@ def _made_by(name: str, journal: Sequence[Mapping[str, Any]]) -> Mapping[str, An
     return next((one for one in reversed(journal) if one.get("state") == "done" and out in one["command"]), None)
 
 
-def preview(name: str, journal: Sequence[Mapping[str, Any]]) -> bool:
-    """Whether a folder of results was made with `--quick`."""
+def preview(project: Project, name: str, journal: Sequence[Mapping[str, Any]]) -> bool:
+    """Whether a folder of results was made with `--quick`, or by a study that says so."""
     line = _made_by(name, journal)
-    return line is not None and "--quick" in line["command"]
+    folder = project.folder / RESULTS / name
+    try:
+        return (line is not None and "--quick" in line["command"]) or quick_study(folder)
+    except DataError:  # a damaged file; the table of variants names it
+        return False
+
+
+def quick_study(results: Path) -> bool:
+    """Whether a folder holds the results of a study with few rays.
+
+    Raises: `DataError` for a record that cannot be read.
+    """
+    record = results / "study.json"
+    return record.is_file() and bool(read_json(record).get("quick"))
 
 
 def outdated(project: Project, name: str, journal: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:

@@ -80,7 +80,6 @@ def variants(project: Project, language: str = "en") -> dict[str, Any] | None:
     shown = [key for key in FIGURES if any(case.get(key) for case in cases)]
     with in_language(language):
         named = [quantity(key) for key in shown]
-    record = read_json(folder / "study.json")
     return {
         "columns": [
             {
@@ -102,7 +101,7 @@ def variants(project: Project, language: str = "en") -> dict[str, Any] | None:
             }
             for case in cases
         ],
-        "quick": bool(record.get("quick")),
+        "quick": actions.quick_study(folder),
     }
 
 
@@ -362,7 +361,7 @@ class AppServer:
         journal = self._project.journal()
         for result in results:
             result["outdated"] = actions.outdated(self._project, result["name"], journal)
-            result["quick"] = actions.preview(result["name"], journal)
+            result["quick"] = actions.preview(self._project, result["name"], journal)
             result["title"] = _result_title(result["name"], titles)
             pages = [result["pages"].get(name) for name in ("report", "dossier")]
             result["answers"] = [text for page in pages if page for text in answers(self._project.folder / page)]

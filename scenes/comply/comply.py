@@ -39,7 +39,7 @@ from scenes.comply.glare import PICTURED, seat_glare, worst_seat_glare
 from scenes.comply.needs import DgpExceeded
 from scenes.comply.options import ComplyOptions
 from scenes.comply.outdoors import OutdoorMesh, outdoors_of
-from scenes.comply.results import CheckedRoom, Compliance, GridSummary, RoomLights
+from scenes.comply.results import ONE_STATE, CheckedRoom, Compliance, GridSummary, RoomLights
 from scenes.comply.rules import GridTable
 from scenes.comply.sunlight import SunExposure, sun_day, sun_exposure
 from scenes.comply.tables import USE_WORDS
@@ -646,7 +646,8 @@ class Check:
     @property
     def blinds(self) -> str:
         """How the blinds move, in words."""
-        return blinds_words(self.shaded, self.operation)
+        movable = max(map(len, self.inputs.filled.values()), default=1) > 1 or self.files.closed is not None
+        return blinds_words(movable, self.shaded, self.operation)
 
     def _light_words(self) -> Iterator[str]:
         """What was assumed for light, glare and heat."""
@@ -717,8 +718,13 @@ def eye_words(options: ComplyOptions, blinds: str) -> str:
     )
 
 
-def blinds_words(shaded: bool, operation: Operation | None) -> str:
-    """How blinds move where glare, temperatures and light at the eye are judged; shaded: real blinds."""
+def blinds_words(movable: bool, shaded: bool, operation: Operation | None) -> str:
+    """How blinds move where glare, temperatures and light at the eye are judged.
+
+    Args: movable: some window has more than one state; shaded: each has.
+    """
+    if not movable:
+        return ONE_STATE
     if shaded and operation is not None:
         return Note("blinds moved as in {file}", file=operation.file.name)
     return Note("blinds closed by the rule of LM-83") if shaded else Note("all blinds open")

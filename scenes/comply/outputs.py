@@ -23,7 +23,7 @@ from scenes.comply import tables
 from scenes.comply.assess import NO_VERDICT, NOT_COMPUTED, BuildingVerdict, RoomVerdict, assess_building
 from scenes.comply.dwellings import OF_DWELLING
 from scenes.comply.findings import SeatGlare
-from scenes.comply.results import CheckedRoom, Compliance, GridSummary
+from scenes.comply.results import ONE_STATE, CheckedRoom, Compliance, GridSummary
 from scenes.comply.rules import NOT_MET, RuleTable
 from scenes.comply.tables import limit_of, missed, shown, values_frame
 from scenes.figures.chart import Chart, ChartMark, box
@@ -105,8 +105,8 @@ def _sentence(result: Compliance, verdict: BuildingVerdict) -> str:
         parts.append(gettext("Annual glare was not asked for."))
     rated = [room.light.glare for room, _ in asked if room.light is not None and room.light.glare is not None]
     if rated and of_glare:
-        operated = any(glare.operated for glare in rated)
-        blinds = translated(result.blinds) if operated else gettext("all blinds open")
+        moved = result.blinds == ONE_STATE or any(glare.operated for glare in rated)
+        blinds = translated(result.blinds) if moved else gettext("all blinds open")
         parts.append(gettext("Rated with {blinds}.", blinds=blinds))
     return " ".join(parts)
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from bim.model import Building, Space
 from bim.report.issue import Issue
+from mitsuba_cfs.notes import Note
 from mitsuba_cfs.sky.weather import Weather
 from scenes.comply.assess import BuildingVerdict, RoomVerdict
 from scenes.comply.findings import Calendar, SeatGlare
@@ -21,6 +22,7 @@ from scenes.comply.view_out import ViewOut
 from scenes.head import Head
 
 FloatArray = NDArray[np.float64]
+ONE_STATE = Note("windows in their only state")  # where no blind moves
 
 
 @dataclass(frozen=True, slots=True)

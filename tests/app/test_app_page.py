@@ -417,6 +417,8 @@ def test_results_of_older_inputs_and_a_damaged_file_are_told(tmp_path) -> None:
             cards = page.value("[...document.querySelectorAll('#folders .card')].map((e) => e.innerText)")
             (report,) = [text for text in cards if "report-glazing" in text]
             assert "preview" in report  # its command had --quick
+            (comparison,) = [text for text in cards if "results/comparison" in text]
+            assert "preview" in comparison  # its study file has it
             assert "out of date" in report and "office.ifc" in report and "Meets it." in report
             best = page.value("[...document.querySelectorAll('#variants .best')].map((e) => e.innerText)")
             assert best == ["82", "12"]

@@ -17,7 +17,7 @@ from bim.model import Element
 from bim.shoebox import WindowRectangle, shoebox
 from mitsuba_cfs.errors import DataError
 from scenes.commands.comply import command
-from scenes.comply.comply import check_rooms
+from scenes.comply.comply import blinds_words, check_rooms
 from scenes.comply.files import ComplyFiles, least_altitude, read_files
 from scenes.comply.findings import SeatGlare
 from scenes.comply.options import ComplyOptions
@@ -32,7 +32,7 @@ from scenes.comply.outputs import (
     write_compliance,
     write_into_ifc,
 )
-from scenes.comply.results import GridSummary, RoomLights
+from scenes.comply.results import ONE_STATE, GridSummary, RoomLights
 from scenes.comply.rules import read_rule
 from scenes.comply.tables import beside_limit, openings_table, shown
 from scenes.comply.uses import read_uses
@@ -352,6 +352,12 @@ def test_what_a_rule_includes_is_in_its_section_and_what_it_leaves_out_ends_the_
     section = html.split('<section id="rule-1"')[1].split("</section>")[0]
     assert "<h3>Included</h3>" in section and "<li>A and b.</li>" in section
     assert "A and b." not in html.split('<section id="assumptions">')[1].split("</section>")[0]
+
+
+def test_windows_of_one_state_have_no_open_blinds():
+    assert blinds_words(False, False, None) == ONE_STATE
+    assert blinds_words(True, False, None) == "all blinds open"  # some windows have none
+    assert blinds_words(True, True, None) == "blinds closed by the rule of LM-83"
 
 
 def test_a_model_without_surroundings_says_so(result):
