@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
@@ -538,7 +537,12 @@ def stated_note(building: Building, before: str = "") -> tuple[str, ...]:
     return (note,)
 
 
-ASSUMED = {"gains": ("equipment_w_m2", "persons", "occupied"), "air": ("infiltration_ach",)}
+ASSUMED: Mapping[tuple[str, str], Callable[[Any], Note]] = {  # what nobody states, in words of its value
+    ("gains", "equipment_w_m2"): lambda value: Note("equipment {value:g} W/m2", value=value),
+    ("gains", "persons"): lambda _one: Note("one person"),
+    ("gains", "occupied"): lambda hours: Note("use from {start:g} to {end:g} o'clock", start=hours[0], end=hours[1]),
+    ("air", "infiltration_ach"): lambda value: Note("{value:g} air changes per hour", value=value),
+}
 
 
 def unstated_note(source: OperationTables | RoomOptions, building: Building, file: str = "") -> tuple[str, ...]:
@@ -562,15 +566,14 @@ def unstated_note(source: OperationTables | RoomOptions, building: Building, fil
         )
         return (note,)
     unstated = [
-        f"{name}.{key} = {json.dumps(getattr(table, key))}"
-        for name, keys in ASSUMED.items()
-        for table in [getattr(source, name)]
-        for key in keys
-        if key not in table.model_fields_set
+        Note("{what} ({key})", what=words(getattr(getattr(source, name), key)), key=f"{name}.{key}")
+        for (name, key), words in ASSUMED.items()
+        if key not in getattr(source, name).model_fields_set
     ]
     if not unstated:
         return ()
-    return (Note("{values}, not stated in {file}.", values=", ".join(unstated), file=file),)
+    values = reduce(lambda before, one: Note("{before}, {one}", before=before, one=one), unstated)
+    return (Note("Not stated in {file}: {values}.", values=values, file=file),)
 
 
 WEEKDAYS = (N_("Monday"), N_("Tuesday"), N_("Wednesday"), N_("Thursday"), N_("Friday"), N_("Saturday"), N_("Sunday"))

@@ -108,7 +108,8 @@ def test_gains_and_leaks_that_nobody_states_are_named(used):
     building, tables = read_honeybee(TWO_ROOMS), OperationTables(gains={"persons": 0})
     (note,) = unstated_note(tables, building, "use.toml")
     assert note == (
-        "gains.equipment_w_m2 = 8.0, gains.occupied = [8, 18], air.infiltration_ach = 0.5, not stated in use.toml."
+        "Not stated in use.toml: equipment 8 W/m2 (gains.equipment_w_m2), use from 8 to 18 o'clock (gains.occupied), "
+        "0.5 air changes per hour (air.infiltration_ach)."
     )
     stated = {"equipment_w_m2": 0, "persons": 0, "occupied": [0, 24]}
     whole = OperationTables(gains=stated, air={"infiltration_ach": 0.5})
