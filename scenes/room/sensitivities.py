@@ -39,6 +39,7 @@ from scenes.room.bands import (
 )
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
+from scenes.room.slats import MovedSlats
 from scenes.room.zone import RoomZone, balances, climate, lamp_daylight, lamp_power, per_window
 from scenes.uncertain_inputs import INPUTS
 from thermal.balance import ZoneResult
@@ -86,6 +87,7 @@ class Change:
     value: float  # of the input
     illuminance: Array  # [S + 1, L] of the sensors, the eye last [lx]
     relative_error: float  # standard error over value of the sensors' mean
+    dgp: Array | None = None  # [L] of DGP; None: by the light at the eye, the glare sources unchanged
 
 
 def light_sensitivities(
@@ -95,16 +97,19 @@ def light_sensitivities(
     daylight: DaylightResult,
     year: pd.DataFrame | None = None,
     spectral: SpectralYear | None = None,
+    *,
+    slats: Sequence[MovedSlats] = (),
 ) -> tuple[pd.DataFrame, LightSamples | None]:
     """Derivatives of the room's light by its inputs, see `sensitivity_table`; samples for bands, if asked for.
 
     Args:
         state: [H, G] of the shading.
+        slats: the room with other slats, see `room_slats`.
         year: `annual_glare`; None: no hours of glare.
         spectral: None: no melanopic light.
     """
     figures = _LightFigures(room, light, state, daylight, year, spectral)
-    changes = list(light_changes(room, light, state))
+    changes = list(light_changes(room, light, state, slats=slats, glare=year is not None))
     table = pd.concat([figures.rows(one) for one in changes if one.key != "tracing"], ignore_index=True)
     samples = None
     if room.options.outputs.bands:
@@ -113,8 +118,18 @@ def light_sensitivities(
     return table, samples
 
 
-def light_changes(room: RoomInputs, light: RoomLight, state: NDArray[np.int64]) -> Iterator[Change]:
-    """What the light of a room depends on, and how."""
+def light_changes(
+    room: RoomInputs,
+    light: RoomLight,
+    state: NDArray[np.int64],
+    *,
+    slats: Sequence[MovedSlats] = (),
+    glare: bool = False,
+) -> Iterator[Change]:
+    """What the light of a room depends on, and how.
+
+    Args: slats: the room with other slats; glare: whether DGP is derived by these.
+    """
     rows, scene = light.states(state), light.scene
     lit = _of_all(light, rows)
     groups, interior = scene.by_groups, scene.interior
@@ -145,7 +160,9 @@ def light_changes(room: RoomInputs, light: RoomLight, state: NDArray[np.int64]) 
     # sensors share paths: their errors are taken as one
     errors = np.append(relative_error_of_mean(values, noise), relative)
     yield Change("tracing", 0.0, lit * errors[:, None], 0.0)
-    tilt = _by_tilt(room, light, rows)
+    for one in slats:
+        yield Change(one.key, one.value, one.slope(state), relative, one.dgp_slope(state) if glare else None)
+    tilt = None if any(one.key == "tilt_deg" for one in slats) else _by_tilt(room, light, rows)
     if tilt is not None:
         value, derivative = tilt
         yield Change("tilt_deg", value, derivative, relative)
@@ -237,7 +254,8 @@ class _LightFigures:
             dgp, by_eye = dgp_and_slope(self._year["dgp"].to_numpy(float), self._year["ev"].to_numpy(float))
             width, used = WIDTHS["glare_hours"], self._used
             value = step_h * ndtr((dgp - GLARE) / width)[used].sum()
-            yield "glare_hours", (value, step_h * float((bell(dgp, GLARE, width) * by_eye * of_eye)[used].sum()))
+            moved = by_eye * of_eye if change.dgp is None else change.dgp
+            yield "glare_hours", (value, step_h * float((bell(dgp, GLARE, width) * moved)[used].sum()))
         if self._spectral is not None:
             seen = self._spectral["melanopic_edi_lx"].to_numpy(float)
             ratio = np.divide(seen, self._eye, out=np.zeros_like(seen), where=self._eye > 0)
@@ -477,10 +495,13 @@ def heat_sensitivities(
     *,
     terrain: str = "suburbs",
     air_links: Array | None = None,
+    moved: Sequence[tuple[Sequence[RoomZone], Sequence[RoomZone]]] = (),
 ) -> list[pd.DataFrame]:
     """Derivatives of each room's temperatures and loads: an input is moved in all rooms together.
 
     Central differences over `STEP_SHARE` of the input's deviation to either side.
+
+    Args: moved: the rooms with each of their `moved_inputs` a step lower and higher.
     """
 
     def figures(moved: Sequence[RoomZone]) -> list[dict[str, float]]:
@@ -499,7 +520,25 @@ def heat_sensitivities(
         for table, room, value, up, down in zip(tables, rooms, base, *ends, strict=True):
             of_figures = [(name, value[name], (up[name] - down[name]) / (2 * step), 0.0) for name in value]
             table.append(sensitivity_table(key, input_value(room, key), of_figures))
+    for key, (low, high) in zip(moved_inputs(rooms), moved, strict=True):
+        for table, room, value, down, up in zip(tables, rooms, base, figures(low), figures(high), strict=True):
+            for one in room.moved:
+                if one.key == key:
+                    of_figures = [(name, value[name], (up[name] - down[name]) / (2 * one.step), 0.0) for name in value]
+                    table.append(sensitivity_table(key, one.value, of_figures))
     return [pd.concat(table, ignore_index=True) for table in tables]
+
+
+def moved_inputs(rooms: Sequence[RoomZone]) -> list[str]:
+    """The inputs of the slats that some of the rooms have."""
+    return list(dict.fromkeys(one.key for room in rooms for one in room.moved))
+
+
+def rooms_at_ends(rooms: Sequence[RoomZone]) -> Iterator[tuple[list[RoomZone], list[RoomZone]]]:
+    """The rooms with each of their `moved_inputs` a step lower and higher; a room without it as it is."""
+    for key in moved_inputs(rooms):
+        ends = [next(((one.low, one.high) for one in room.moved if one.key == key), (room, room)) for room in rooms]
+        yield [low for low, _ in ends], [high for _, high in ends]
 
 
 def heat_figures(room: RoomZone, result: ZoneResult, weather: Weather) -> dict[str, float]:
