@@ -25,7 +25,7 @@ from scenes.fenestration.thermal_file import ClosureTable, GlazingLayerTable, Sl
 from scenes.fenestration.tilts import between_tilts
 
 BANDS = ("Visible", "Solar")
-PATHS = 32_768  # for each incident patch and side, of a moved blind
+PATHS = 65_536  # for each incident patch and side, of a moved blind
 SEED = 1
 SLAT_INPUTS = ("tilt_deg", "slat_width_mm", "slat_reflectance")  # of `scenes.uncertain_inputs`
 

@@ -438,8 +438,8 @@ class ClosureTable(TomlTable):
         """The table where its layers give the system's BSDF: panes with their light, slats with their reflectance."""
         slats = [layer.slats for layer in self.layers if layer.is_shade]
         known = len(slats) == 1 and slats[0] is not None and slats[0].visible is not None
-        panes = (layer for layer in self.layers if not layer.is_shade)
-        return self if known and all(pane.pane or pane.solar for pane in panes) else None
+        panes = [layer for layer in self.layers if not layer.is_shade]
+        return self if known and panes and all(pane.pane or pane.solar for pane in panes) else None
 
     def _resistance(self) -> LayerResistance | None:
         """R(T_m, dT) as stated, by coefficients or by a table."""

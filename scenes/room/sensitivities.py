@@ -87,7 +87,10 @@ class Change:
     value: float  # of the input
     illuminance: Array  # [S + 1, L] of the sensors, the eye last [lx]
     relative_error: float  # standard error over value of the sensors' mean
-    dgp: Array | None = None  # [L] of DGP; None: by the light at the eye, the glare sources unchanged
+    step: float = 0.0  # over which counts are central differences; 0: their smoothed slope
+    # [L] with the input a step lower and higher; None: by the light at the eye, the glare sources unchanged
+    dgp: tuple[Array, Array] | None = None
+    melanopic: Array | None = None  # [L] of melanopic EDI at the eye [lx]; None: the ratio to illuminance stays
 
 
 def light_sensitivities(
@@ -109,7 +112,8 @@ def light_sensitivities(
         spectral: None: no melanopic light.
     """
     figures = _LightFigures(room, light, state, daylight, year, spectral)
-    changes = list(light_changes(room, light, state, slats=slats, glare=year is not None))
+    wanted = {"glare": year is not None, "melanopic": spectral is not None}
+    changes = list(light_changes(room, light, state, slats=slats, **wanted))
     table = pd.concat([figures.rows(one) for one in changes if one.key != "tracing"], ignore_index=True)
     samples = None
     if room.options.outputs.bands:
@@ -125,10 +129,11 @@ def light_changes(
     *,
     slats: Sequence[MovedSlats] = (),
     glare: bool = False,
+    melanopic: bool = False,
 ) -> Iterator[Change]:
     """What the light of a room depends on, and how.
 
-    Args: slats: the room with other slats; glare: whether DGP is derived by these.
+    Args: slats: the room with other slats; glare, melanopic: whether DGP and melanopic EDI are derived by these.
     """
     rows, scene = light.states(state), light.scene
     lit = _of_all(light, rows)
@@ -161,7 +166,9 @@ def light_changes(
     errors = np.append(relative_error_of_mean(values, noise), relative)
     yield Change("tracing", 0.0, lit * errors[:, None], 0.0)
     for one in slats:
-        yield Change(one.key, one.value, one.slope(state), relative, one.dgp_slope(state) if glare else None)
+        of_dgp = one.dgp(state) if glare else None
+        of_melanopic = one.melanopic_slope(state) if melanopic else None
+        yield Change(one.key, one.value, one.slope(state), relative, one.step, of_dgp, of_melanopic)
     tilt = None if any(one.key == "tilt_deg" for one in slats) else _by_tilt(room, light, rows)
     if tilt is not None:
         value, derivative = tilt
@@ -207,6 +214,18 @@ def bell(values: Array, limit: float | Array, width: float) -> Array:
     return density
 
 
+def count_slope(values: Array, slope: Array, limit: float, width: float, step: float) -> Array:
+    """Derivative of Phi((value - limit) / width) by an input by which the values have a slope.
+
+    Args: step: of the input, for a central difference; 0: none.
+    """
+    if step <= 0:
+        return bell(values, limit, width) * slope
+    high, low = (ndtr((values + by * slope - limit) / width) for by in (step, -step))
+    difference: Array = (high - low) / (2 * step)
+    return difference
+
+
 class _LightFigures:
     """The figures of a room's light, smoothed, and their derivatives by that of the illuminance."""
 
@@ -244,25 +263,32 @@ class _LightFigures:
         of_plane, of_eye = change.illuminance[self._plane], change.illuminance[-1]
         hours, step_h = self._room.skies.hours, self._room.weather.step_h
         yield "mean_illuminance_lx", (self._values.sum(axis=1).mean() / hours, of_plane.sum(axis=1).mean() / hours)
-        slope = bell(self._values, TARGET_LX, WIDTHS["da300"]) * self._counted * of_plane
+        step = change.step
+        slope = count_slope(self._values, of_plane, TARGET_LX, WIDTHS["da300"], step) * self._counted
         of_sensors = 100.0 * slope.sum(axis=1) / self._hours
         yield "da300", (float(self._da.mean()), float(of_sensors.mean()))
         width = WIDTHS["sda300_50"]
-        area = bell(self._da, HALF, width) * of_sensors
+        area = count_slope(self._da, of_sensors, HALF, width, step)
         yield "sda300_50", (100.0 * float(ndtr((self._da - HALF) / width).mean()), 100.0 * float(area.mean()))
         if self._year is not None:
             dgp, by_eye = dgp_and_slope(self._year["dgp"].to_numpy(float), self._year["ev"].to_numpy(float))
             width, used = WIDTHS["glare_hours"], self._used
             value = step_h * ndtr((dgp - GLARE) / width)[used].sum()
-            moved = by_eye * of_eye if change.dgp is None else change.dgp
-            yield "glare_hours", (value, step_h * float((bell(dgp, GLARE, width) * moved)[used].sum()))
+            if change.dgp is None:
+                of_hours = count_slope(dgp, by_eye * of_eye, GLARE, width, step)
+            else:
+                low, high = (ndtr((end - GLARE) / width) for end in change.dgp)
+                of_hours = (high - low) / (2 * step)
+            yield "glare_hours", (value, step_h * float(of_hours[used].sum()))
         if self._spectral is not None:
             seen = self._spectral["melanopic_edi_lx"].to_numpy(float)
             ratio = np.divide(seen, self._eye, out=np.zeros_like(seen), where=self._eye > 0)
-            by, width, used = ratio * of_eye, WIDTHS["melanopic_hours"], self._used
+            by = ratio * of_eye if change.melanopic is None else change.melanopic
+            width, used = WIDTHS["melanopic_hours"], self._used
             yield "melanopic_edi_mean_lx", (seen[used].mean(), float(by[used].mean()))
             value = step_h * ndtr((seen - MELANOPIC_BY_DAY) / width)[used].sum()
-            yield "melanopic_hours", (value, step_h * float((bell(seen, MELANOPIC_BY_DAY, width) * by)[used].sum()))
+            of_hours = count_slope(seen, by, MELANOPIC_BY_DAY, width, step)
+            yield "melanopic_hours", (value, step_h * float(of_hours[used].sum()))
         tables = self._room.operation
         if tables is not None and tables.gains.dims:
             powers = [self._lamps(sign * change.illuminance, change) for sign in (1.0, -1.0)]

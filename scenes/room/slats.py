@@ -32,6 +32,7 @@ from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
 from scenes.room.shading import RuledYear
 from scenes.room.solar import SeasonalOutdoors
+from scenes.room.spectral import eye_illuminances
 from scenes.room.zone import MovedZone, RoomZone, reads_work_plane, room_zone, zone_surfaces
 from scenes.uncertain_inputs import INPUTS
 
@@ -66,8 +67,8 @@ class MovedSlats:
         slope: Array = (self.high.illuminance(state) - self.low.illuminance(state)) / (2 * self.step)
         return slope
 
-    def dgp_slope(self, state: NDArray[np.int64]) -> Array:
-        """Derivative of DGP in the lit hours [L]: of the occupied hours with slats, else 0."""
+    def dgp(self, state: NDArray[np.int64]) -> tuple[Array, Array]:
+        """DGP in the lit hours [L] with the input a step lower and higher; 0 where nobody is there or no slats are."""
         room = self.low.room
         rows = state[room.skies.lit]
         slats = np.zeros(len(rows), dtype=bool)
@@ -75,12 +76,17 @@ class MovedSlats:
             with_slats = np.array([has_recipe(one) for one in states])
             slats |= with_slats[np.minimum(row, len(states) - 1)]
         columns = np.flatnonzero(slats & room.occupied[room.skies.lit])
-        found = np.zeros(len(rows))
-        if len(columns):
-            hours = room.skies.lit[columns]
-            high, low = (rated_hours(end.room, end.light, state, "DGP", hours).dgp for end in (self.high, self.low))
-            found[columns] = (np.asarray(high, dtype=float) - np.asarray(low, dtype=float)) / (2 * self.step)
-        return found
+        low, high = np.zeros(len(rows)), np.zeros(len(rows))
+        for end, values in ((self.low, low), (self.high, high)):
+            if len(columns):
+                values[columns] = rated_hours(end.room, end.light, state, "DGP", room.skies.lit[columns]).dgp
+        return low, high
+
+    def melanopic_slope(self, state: NDArray[np.int64]) -> Array:
+        """Derivative of melanopic EDI at the eye by daylight in the lit hours [L] [lx]; state: [H, G]."""
+        high, low = (eye_illuminances(end.room, end.light, state)[0][1] for end in (self.high, self.low))
+        slope: Array = ((high - low) / (2 * self.step))[self.low.room.skies.lit]
+        return slope
 
 
 def room_slats(room: RoomInputs, light: RoomLight) -> Iterator[MovedSlats]:

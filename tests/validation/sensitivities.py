@@ -39,9 +39,9 @@ KEYS = {
     "u": "u_value",
 }
 SLATS = {  # key of the table, step, key in the layers and its unit there
-    "tilt": ("tilt_deg", 1.5, {"tilt_deg": 1.0}),
-    "width": ("slat_width_mm", 1.0, {"width": 1e-3}),
-    "slats": ("slat_reflectance", 0.02, {"visible": 1.0, "solar": 1.0}),
+    "tilt": ("tilt_deg", 3.0, {"tilt_deg": 1.0}),
+    "width": ("slat_width_mm", 2.0, {"width": 1e-3}),
+    "slats": ("slat_reflectance", 0.05, {"visible": 1.0, "solar": 1.0}),
 }
 BLIND = ("--glazing", "double low-e", "--shade", "venetian 80 mm, 45 deg")
 PATHS = 131_072  # of the slats of whole runs
