@@ -244,13 +244,18 @@ class _LightFigures:
         self._values = daylight.illuminance[self._lit].T.astype(float)  # [S, L]
         counted = room.skies.once(lm83_hours, room.weather)
         self._counted, self._hours = counted[self._lit], int(counted.sum())
-        smooth = ndtr((self._values - TARGET_LX) / WIDTHS["da300"]) * self._counted
-        self._da = 100.0 * smooth.sum(axis=1) / self._hours
+        self._da = self._autonomy(self._values)
         self._eye = light.eye(state).astype(float)
         self._year = None if year is None else year.iloc[self._lit]
         self._used = room.occupied[self._lit]
         self._spectral = None if spectral is None else spectral.eye.iloc[self._lit]
         self._daylight = daylight
+
+    def _autonomy(self, values: Array) -> Array:
+        """Smoothed DA of each sensor [S] [%] by illuminance [S, L]."""
+        smooth = ndtr((values - TARGET_LX) / WIDTHS["da300"]) * self._counted
+        share: Array = 100.0 * smooth.sum(axis=1) / self._hours
+        return share
 
     def rows(self, change: Change) -> pd.DataFrame:
         """The rows of one input."""
@@ -268,8 +273,14 @@ class _LightFigures:
         of_sensors = 100.0 * slope.sum(axis=1) / self._hours
         yield "da300", (float(self._da.mean()), float(of_sensors.mean()))
         width = WIDTHS["sda300_50"]
-        area = count_slope(self._da, of_sensors, HALF, width, step)
-        yield "sda300_50", (100.0 * float(ndtr((self._da - HALF) / width).mean()), 100.0 * float(area.mean()))
+        if step > 0:
+            low, high = (
+                ndtr((self._autonomy(self._values + by * of_plane) - HALF) / width).mean() for by in (-step, step)
+            )
+            area = float(high - low) / (2 * step)
+        else:
+            area = float((bell(self._da, HALF, width) * of_sensors).mean())
+        yield "sda300_50", (100.0 * float(ndtr((self._da - HALF) / width).mean()), 100.0 * area)
         if self._year is not None:
             dgp, by_eye = dgp_and_slope(self._year["dgp"].to_numpy(float), self._year["ev"].to_numpy(float))
             width, used = WIDTHS["glare_hours"], self._used
