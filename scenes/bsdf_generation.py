@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
 import pandas as pd
+import tomlkit
 from numpy.typing import NDArray
 from scipy.interpolate import BarycentricInterpolator
 
@@ -30,7 +32,9 @@ from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.spectra.detectors import visible_mean
-from scenes.fenestration.thermal_file import read_reflectance, reflectance_of_code
+from scenes.fenestration.slats import layers_bsdf, recipe_slats
+from scenes.fenestration.thermal_file import ThermalTable, read_reflectance, reflectance_of_code
+from scenes.toml_file import read_table, validated, with_absolute_files
 
 SHEETS = ("venetian", "louvre", "perforated", "woven", "pleated")  # shapes of one material
 # shares of the largest reflectance at which coloured sheets are traced: zeros of Chebyshev's polynomial and the ends
@@ -110,6 +114,8 @@ def generated_file(
     exact += "".join(f"\nnote: {note}" for note in notes)
     bands = dict(zip(("Visible", "Solar"), systems, strict=True))
     file = BsdfFile(bands, name=name or options["shape"], thickness=layer.thickness)
+    if options["shape"] == "venetian":
+        exact += f"\nas one of the layers of a .toml: {slat_layer(options)}"
     if product is not None:
         shade = read_shade_file(product)
         file = replace(file, name=name or shade.name, manufacturer=shade.manufacturer)
@@ -289,6 +295,36 @@ def _twice(sheet: SlatMaterial) -> SlatMaterial:
         reflectance_back=2 * sheet.reflectance_back,
         transmittance=2 * sheet.transmittance,
     )
+
+
+def layers_file(path: Path, *, paths: int, seed: int, name: str = "") -> tuple[BsdfFile, str]:
+    """The BSDF file of the panes and slats of a `.toml` file, and that file's text for another folder.
+
+    Raises: `DataError` for layers that do not give their BSDF.
+    """
+    table = read_table(path)
+    placed = validated(ThermalTable, table, path).placed(path.parent)
+    if placed.recipe is None:
+        message = "expected panes with `pane` or `solar`, and one layer of `slats` with `visible`"
+        raise DataError(message, file=path, field="layers")
+    try:
+        (bands,) = layers_bsdf(placed.layers, paths=paths, seed=seed)
+    except DataError as error:
+        raise DataError(error.message, file=path, field=error.field) from None
+    slats = recipe_slats(placed)
+    described = f"slats {1e3 * slats.width:g} mm at {slats.tilt_deg:g} deg"
+    return BsdfFile(dict(bands), name=name or f"{path.stem}, {described}"), tomlkit.dumps(
+        with_absolute_files(table, path.parent)
+    )
+
+
+def slat_layer(options: Mapping[str, Any]) -> str:
+    """The slats of the options of `cfs bsdf generate` as one of the `[[layers]]` of a thermal file."""
+    lengths = {"width": "depth_mm", "spacing": "spacing_mm", "radius": "radius_mm", "thickness": "thickness_mm"}
+    keys = {key: (options[name] or 0.0) / 1000 for key, name in lengths.items()}
+    keys |= {key: options[key] for key in ("tilt_deg", "visible", "solar", "specular", "roughness")}
+    stated = (f"{key} = {value:g}" for key, value in keys.items() if value or key in ("tilt_deg", "visible"))
+    return f"{{ slats = {{ {', '.join(stated)} }} }}"
 
 
 def combined_file(paths: Sequence[Path], name: str = "") -> tuple[BsdfFile, pd.DataFrame, tuple[str, ...]]:

@@ -39,5 +39,7 @@ INPUTS = {
         UncertainInput("infiltration_percent", N_("air through leaks"), "%", 30.0),
         UncertainInput("heating_set_c", N_("set point of heating"), "K", 0.5),
         UncertainInput("cooling_set_c", N_("set point of cooling"), "K", 0.5),
+        UncertainInput("slat_width_mm", N_("width of the slats"), "mm", 2.0),
+        UncertainInput("slat_reflectance", N_("reflectance of the slats"), "", 0.05),
     )
 }

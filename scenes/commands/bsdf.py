@@ -304,6 +304,33 @@ def generate(out: Path, **options) -> None:
     click.echo(f"{out}: {exact}")
 
 
+@command.command("system")
+@click.argument("layers", type=FILE, metavar="LAYERS.toml")
+@click.option("--paths", type=click.IntRange(min=1), default=32_768, help="Paths for each direction and side.")
+@seed_option
+@click.option("--name", default="", help="Name to write into the file.")
+@click.option("--out", type=FILE, required=True, help="XML file to write; LAYERS.toml goes beside it.")
+def system(layers: Path, paths: int, seed: int, name: str, out: Path) -> None:
+    """Trace the BSDF of panes and a blind by the `[[layers]]` of LAYERS.toml and write it.
+
+    The slats state their reflectance (`visible`). A run with --sensitivities then derives its results
+    by tilt, width and reflectance of the slats.
+    """
+    from scenes.bsdf_generation import layers_file
+
+    beside = out.with_suffix(".toml")
+    check_file(out, inputs=[layers])
+    if beside.absolute() != layers.absolute():
+        check_file(beside, inputs=[layers])
+    file, text = layers_file(layers, paths=paths, seed=seed, name=name)
+    write_bsdf_xml(file, out)
+    if beside.absolute() != layers.absolute():
+        write_text(beside, text)
+    for band in file.bands:
+        tau = direct_hemispherical(file.band(band), "transmission_front", [0.0, 0.0, 1.0])[0]
+        click.echo(f"{out}: {band}: transmittance at normal incidence {tau:.4f}")
+
+
 @command.command("library")
 @click.option(
     "--glazing", type=click.Choice(list(GENERIC_GLAZINGS)), help="Reference glazing by name; of the system to write."

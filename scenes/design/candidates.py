@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
 import tomlkit
 from pydantic import BaseModel
 
-from mitsuba_cfs.bsdf.blinds import venetian_blind
-from mitsuba_cfs.bsdf.bsdf_file import Bsdf, BsdfFile
-from mitsuba_cfs.bsdf.klems import KlemsBsdf
-from mitsuba_cfs.bsdf.layers import combine_layers
-from mitsuba_cfs.bsdf.periodic import plastic
+from mitsuba_cfs.bsdf.bsdf_file import BsdfFile
 from mitsuba_cfs.bsdf.xml import write_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import write_text
 from mitsuba_cfs.matrices.cache import digest
 from mitsuba_cfs.source_code import code_version
 from scenes.design.design_file import OWN, SYSTEM, BlindTable, Design, DesignSystem, VariableTable
-from scenes.fenestration.systems import system_of_panes
+from scenes.fenestration.slats import layers_bsdf
+from scenes.fenestration.thermal_file import GlazingLayerTable
 from scenes.quick import ROOM, picks
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.study.study_file import Study
 from scenes.toml_file import TomlTable, read_table, set_key, validated, with_absolute_files
 
-BANDS = ("Visible", "Solar")
 SLAT_RULES = ("cut-off",)  # rules that need the size of the slats
 
 
@@ -74,7 +69,17 @@ def operation_text(table: dict[str, Any]) -> str:
 
 def _lowered(system: DesignSystem, blind: BlindTable, tilt: float, folder: Path, traced: bool) -> dict[str, Any]:
     """The state with the blind at a tilt."""
-    slats = {"width": blind.slat_width, "spacing": blind.slat_spacing, "tilt_deg": tilt}
+    slats = {
+        "width": blind.slat_width,
+        "spacing": blind.slat_spacing,
+        "tilt_deg": tilt,
+        "visible": blind.visible,
+        "solar": blind.visible if blind.solar is None else blind.solar,
+        "specular": blind.specular,
+        "roughness": blind.roughness,
+    }
+    if blind.slat_radius:
+        slats["radius"] = blind.slat_radius
     shade: dict[str, Any] = {"slats": slats, "emissivity": [blind.emissivity, blind.emissivity]}
     panes = [_plain(layer) for layer in system.layers]
     if blind.position == "outdoors":
@@ -82,50 +87,32 @@ def _lowered(system: DesignSystem, blind: BlindTable, tilt: float, folder: Path,
     else:
         layers = [*panes[:-1], panes[-1] | {"gap": {"width": blind.distance}}, shade]
     return {
-        "bsdf": str(_bsdf_file(system, blind, tilt, folder, traced)),
+        "bsdf": str(_bsdf_file(system, blind, tilt, layers, folder, traced)),
         "tilt_deg": tilt,
         "see_through": "specular",
         "layers": layers,
     }
 
 
-def _bsdf_file(system: DesignSystem, blind: BlindTable, tilt: float, folder: Path, traced: bool) -> Path:
+def _bsdf_file(
+    system: DesignSystem, blind: BlindTable, tilt: float, layers: Sequence[dict[str, Any]], folder: Path, traced: bool
+) -> Path:
     """The BSDF file of the panes with the blind at a tilt, traced where it is missing."""
     of_light = blind.model_dump_json(exclude={"tilt_deg", "tilts_deg", "emissivity", "distance"})
     panes = [layer.model_dump_json() for layer in system.layers]
-    key = digest(code_version("mitsuba_cfs.bsdf.generate"), code_version(__name__), of_light, tilt, panes)
+    key = digest(code_version("mitsuba_cfs.bsdf.generate"), code_version(layers_bsdf.__module__), of_light, tilt, panes)
     path = folder / f"blind-{key[:16]}.xml"
     if path.is_file() or not traced:
         return path
-    glazing = system_of_panes(system.layers)
-    slats = _slats(blind, tilt)
-    blocks = {"Visible": glazing.visible, "Solar": glazing.solar}
-    outdoors = blind.position == "outdoors"
-    bands: dict[str, Bsdf] = {}
-    for band, own in zip(BANDS, slats, strict=True):
-        order = [own, blocks[band]] if outdoors else [blocks[band], own]
-        bands[band] = combine_layers(order).bsdf
-    name = f"{system.name}, {tilt:g} deg"
-    write_bsdf_xml(BsdfFile(bands, name=name, emissivity_front=blind.emissivity, emissivity_back=0.84), path, digits=5)
-    return path
-
-
-def _slats(blind: BlindTable, tilt: float) -> tuple[KlemsBsdf, ...]:
-    """The BSDF of the slats in both bands."""
-    from mitsuba_cfs.bsdf.generate import generate_klems
-
-    solar = blind.visible if blind.solar is None else blind.solar
     try:
-        layer = venetian_blind(
-            plastic("slats", blind.visible, solar, specular=blind.specular, roughness=blind.roughness),
-            depth=blind.slat_width,
-            spacing=blind.slat_spacing,
-            tilt=np.radians(tilt),
-            radius=blind.slat_radius or np.inf,
-        )
-    except ValueError as error:  # sizes that do not go together
-        raise DataError(str(error), field="system.blind") from None
-    return generate_klems(layer, samples=blind.paths, seed=blind.seed).bsdf
+        tables = [validated(GlazingLayerTable, layer, Path()) for layer in layers]
+        (bands,) = layers_bsdf(tables, paths=blind.paths, seed=blind.seed)
+    except DataError as error:  # sizes that do not go together
+        raise DataError(error.message, field="system.blind") from None
+    name = f"{system.name}, {tilt:g} deg"
+    file = BsdfFile(dict(bands), name=name, emissivity_front=blind.emissivity, emissivity_back=0.84)
+    write_bsdf_xml(file, path, digits=5)
+    return path
 
 
 def _plain(table: TomlTable) -> dict[str, Any]:

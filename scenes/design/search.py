@@ -1,14 +1,17 @@
 """Search for the best points of a space, by few evaluations.
 
 The surrogate is a Gaussian process (scikit-learn; Matern 5/2 with a length for each variable) of
-the objective, and one for each limit.  The next point has the greatest expected improvement times
+the objective, and one for each limit.  Its lengths are the most probable ones, by the likelihood and a
+prior: by the likelihood alone, which a dozen points hardly determine, a limit seems known where it is not, and
+the search stays away from the best points that meet it.  The next point has the greatest expected improvement times
 the probability that all limits are met.  Several objectives are made one by the augmented
 Chebyshev sum with weights that change from point to point (ParEGO).  Everything follows from the
 seed.
 
 Source: Jones, Schonlau, Welch 1998, doi:10.1023/A:1008306431147 (expected improvement); Gardner et
     al. 2014, "Bayesian optimization with inequality constraints"; Knowles 2006,
-    doi:10.1109/TEVC.2005.851274 (ParEGO).
+    doi:10.1109/TEVC.2005.851274 (ParEGO); Hvarfner, Hellsten, Nardi 2024, "Vanilla Bayesian optimization
+    performs great in high dimensions" (prior of the lengths, by the number of features).
 """
 
 from __future__ import annotations
@@ -21,13 +24,19 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize
 from scipy.special import ndtr
 from scipy.stats import qmc
 
 FloatArray = NDArray[np.float64]
 Point = tuple[float | int, ...]  # of each variable: the number of its option, or a number
 MOST_CANDIDATES = 4000  # points whose expected improvement is computed for the next evaluation
-REFITTED = 1.15  # growth of the number of points after which the lengths are fitted again
+ALWAYS_FITTED = 60  # points up to which the lengths are fitted for each further one
+REFITTED = 1.15  # from there on, growth of the number of points after which they are fitted again
+LENGTH_PRIOR = np.sqrt(2.0), np.sqrt(3.0)  # mean without log(features) / 2 and deviation of a length's logarithm
+AMPLITUDE_PRIOR = 0.0, 1.0  # of the logarithm of the variance, over that of the values
+NOISE_PRIOR = float(np.log(1e-4)), 2.0  # of the logarithm of the noise's variance, likewise
+FIRST_LENGTHS = 0.7, 0.5  # from which the most probable ones are looked for
 BEST = 10  # points near which others are looked for
 AUGMENTED = 0.05  # of the sum, beside the greatest of the weighted objectives
 TRIED = 50  # points at random for each one that is wanted
@@ -216,12 +225,12 @@ class _Models:
             return np.full(len(others), values[0]), np.zeros(len(others))
         x = self.features(points)
         count, kernel = self._fitted.get(name, (0, None))
-        fit = len(points) >= REFITTED * count
+        fit = len(points) != count if len(points) <= ALWAYS_FITTED else len(points) >= REFITTED * count
         if kernel is None:
-            lengths = Matern(np.full(x.shape[1], 0.7), (0.05, 30.0), nu=2.5)
+            lengths = Matern(np.full(x.shape[1], FIRST_LENGTHS[0]), (0.05, 30.0), nu=2.5)
             kernel = ConstantKernel(1.0, (0.05, 50.0)) * lengths + WhiteKernel(1e-4, (1e-8, 0.1))
         process = GaussianProcessRegressor(
-            kernel, optimizer="fmin_l_bfgs_b" if fit else None, normalize_y=True, random_state=self._seed
+            kernel, optimizer=most_probable if fit else None, normalize_y=True, random_state=self._seed
         )
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ConvergenceWarning)  # a length at its bound: a variable that does nothing
@@ -240,6 +249,33 @@ class _Models:
         ]
         count = len(outcomes[0].objectives)
         return Outcome(tuple(means[:count]), tuple(means[count:]))
+
+
+def most_probable(
+    misfit: Callable[..., tuple[float, FloatArray]], start: FloatArray, bounds: FloatArray
+) -> tuple[FloatArray, float]:
+    """The most probable logarithms of amplitude, lengths and noise of a kernel, by likelihood and priors.
+
+    The prior of a length is lognormal, and its density is that of the length (not of its logarithm).
+
+    Args: misfit: negative log likelihood and its gradient; start: where to begin; bounds: [n, 2].
+    """
+    count = len(start) - 2
+    middle, deviation = LENGTH_PRIOR[0] + 0.5 * np.log(count), LENGTH_PRIOR[1]
+    means = np.array([AMPLITUDE_PRIOR[0], *[middle] * count, NOISE_PRIOR[0]])
+    deviations = np.array([AMPLITUDE_PRIOR[1], *[deviation] * count, NOISE_PRIOR[1]])
+    of_length = np.array([0.0, *[1.0] * count, 0.0])
+
+    def lost(theta: FloatArray) -> tuple[float, FloatArray]:
+        value, gradient = misfit(theta, eval_gradient=True)
+        z = (theta - means) / deviations
+        return value + float(0.5 * z @ z + of_length @ theta), gradient + z / deviations + of_length
+
+    second = start.copy()
+    second[1:-1] = np.log(FIRST_LENGTHS[1])
+    found = [minimize(lost, at, jac=True, bounds=bounds, method="L-BFGS-B") for at in (start, second)]
+    best = min(found, key=lambda one: float(one.fun))
+    return best.x, float(best.fun)
 
 
 def _next(

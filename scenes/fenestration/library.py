@@ -244,6 +244,9 @@ def _heat_layer(shade: ShadeEntry) -> dict[str, Any]:
     if shade.slats is not None:
         slats = shade.slats
         layer["slats"] = {"width": slats.depth, "spacing": slats.spacing, "tilt_deg": slats.tilt_deg}
+        if np.isfinite(slats.radius):
+            layer["slats"]["radius"] = slats.radius
+        layer["slats"]["visible"] = shade.reflectance
     else:
         layer["openness"] = shade.openness
     return layer

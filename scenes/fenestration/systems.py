@@ -21,7 +21,7 @@ from mitsuba_cfs.bsdf.tensor_tree import TensorTreeBsdf
 from mitsuba_cfs.bsdf.xml import read_bsdf_xml
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.notes import Note
-from scenes.fenestration.thermal_file import GlazingLayerTable, ThermalFile, spectral_panes
+from scenes.fenestration.thermal_file import ClosureTable, GlazingLayerTable, ThermalFile, spectral_panes
 from thermal.closure import Closure
 
 Panes = tuple[SpectralPane, ...]
@@ -50,6 +50,7 @@ class FenestrationSystem:
     from_values: bool = False  # modelled from U, g and transmittances, without a BSDF
     tilt_deg: float | None = None  # of its slats; None: not stated, or none
     between: NeighbourTilts | None = None  # that it is interpolated from
+    recipe: ClosureTable | None = None  # whose layers give its BSDF; None: not known
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -125,6 +126,7 @@ def read_system(
         angular=beside.angular,
         panes=beside.panes,
         spectrum=beside.spectrum,
+        recipe=beside.recipe,
         notes=file.notes,
         file=path,
         source=f"{by} {path.name}".strip(),
@@ -158,7 +160,16 @@ def system_of(
     *,
     path: Path,
     notes: Sequence[str] = (),
-    **more: float | str | Path | NDArray[np.float64] | Closure | AngularTable | Panes | SpectralFactor | None,
+    **more: float
+    | str
+    | Path
+    | NDArray[np.float64]
+    | Closure
+    | AngularTable
+    | Panes
+    | SpectralFactor
+    | ClosureTable
+    | None,
 ) -> FenestrationSystem:
     """The system of BSDF data by band, Klems full or tensor trees.
 

@@ -208,12 +208,32 @@ class LayerGapTable(TomlTable):
 
 
 class SlatTable(TomlTable):
-    """The slats of a venetian blind."""
+    """The slats of a venetian blind; with `visible` the recipe of their BSDF."""
 
     width: Length
     spacing: Length
     tilt_deg: Annotated[float, Field(ge=-90, le=90)] = 0.0  # positive lowers the outer edge
-    thickness: Length = 0.0005
+    thickness: Length = 0.0005  # 0 in light where it is not stated
+    radius: Length | None = None  # of the curvature, the hollow side down; None: flat
+    visible: Share | None = None  # reflectance
+    solar: Share | None = None  # None: as visible
+    specular: Share = 0.0  # as of `cfs bsdf generate`
+    roughness: Share = 0.0
+
+    @model_validator(mode="after")
+    def _has_its_reflectance(self) -> SlatTable:
+        for key in ("solar", "specular", "roughness"):
+            if key in self.model_fields_set and self.visible is None:
+                raise ValueError(f"{key}: needs `visible`, the reflectance of the slats")
+        if self.radius is not None and self.radius < self.width / 2:
+            raise ValueError("radius: expected at least half the width")
+        return self
+
+    @property
+    def reflectances(self) -> tuple[float, float]:
+        """Visible and solar reflectance; 0 where it is not stated."""
+        visible = self.visible or 0.0
+        return visible, visible if self.solar is None else self.solar
 
 
 class CellTable(TomlTable):
@@ -412,6 +432,14 @@ class ClosureTable(TomlTable):
             unit=unit,
             **more,
         )
+
+    @property
+    def recipe(self: Table) -> Table | None:
+        """The table where its layers give the system's BSDF: panes with their light, slats with their reflectance."""
+        slats = [layer.slats for layer in self.layers if layer.is_shade]
+        known = len(slats) == 1 and slats[0] is not None and slats[0].visible is not None
+        panes = [layer for layer in self.layers if not layer.is_shade]
+        return self if known and panes and all(pane.pane or pane.solar for pane in panes) else None
 
     def _resistance(self) -> LayerResistance | None:
         """R(T_m, dT) as stated, by coefficients or by a table."""
@@ -671,6 +699,7 @@ class ThermalFile:
     panes: tuple[SpectralPane, ...] = ()  # all layers, where each is a file of spectra
     spectrum: SpectralFactor | None = None  # None: not known
     see_through: float | None = None  # share of the transmission peak that passes straight on
+    recipe: ClosureTable | None = None  # whose layers give the BSDF
 
     @classmethod
     def read(cls, path: Path) -> ThermalFile:
@@ -693,4 +722,5 @@ class ThermalFile:
             spectral_panes(placed.layers),
             placed.spectrum(),
             table.straight_share,
+            placed.recipe,
         )

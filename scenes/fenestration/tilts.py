@@ -75,6 +75,7 @@ def between_tilts(low: FenestrationSystem, high: FenestrationSystem, share: floa
         g_value=mean(low.g_value, high.g_value),
         g_by_patch=by_patch,
         tilt_deg=tilt,
+        recipe=None,
         between=NeighbourTilts(low, high, share),
     )
 

@@ -31,7 +31,7 @@ from scenes.results import (
 )
 from scenes.room.bands import LightSamples, deviations, draws, room_bands
 from scenes.room.operation_tables import ComfortTable, OperationTables
-from scenes.room.sensitivities import heat_sensitivities
+from scenes.room.sensitivities import heat_sensitivities, rooms_at_ends
 from scenes.room.zone import RoomZone, balances, coupled, inner_sun_note
 from thermal.balance import ZoneResult
 from thermal.comfort import comfort_by_outdoors, degree_hours, pmv_ppd, standard_effective_temperature, summarise
@@ -375,7 +375,11 @@ def coupled_years(
         on_zones(balanced, links)
     progress("heat balance", 1.0)
     if any(room.sensitivities is not None for room in rooms):
-        derived = heat_sensitivities(zones, weather, step_s, terrain=tables.terrain, air_links=links)
+        ends = (
+            (coupled(low, tables.air.door_m3_s)[0], coupled(high, tables.air.door_m3_s)[0])
+            for low, high in rooms_at_ends([room.zone for room in rooms])
+        )
+        derived = heat_sensitivities(zones, weather, step_s, terrain=tables.terrain, air_links=links, moved=list(ends))
         rooms = [room.with_sensitivities(of_heat, seed) for room, of_heat in zip(rooms, derived, strict=True)]
     years = [room.with_heat(heat) for room, heat in zip(rooms, heats, strict=True)]
     return years, (_coupling_note(zones), *inner_sun_note(zones, weather.step_h))

@@ -468,6 +468,7 @@ def read_state(table: StateTable, path: Path | None, *, by: str = "") -> Fenestr
     return replace(
         system,
         closure=table.closure() or system.closure,
+        recipe=table.recipe if table.layers else system.recipe,
         g_by_patch=system.g_by_patch if by_patch is None else by_patch,
         shading_position=table.shading_position or system.shading_position,
         spectrum=spectrum,

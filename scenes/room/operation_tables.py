@@ -497,6 +497,8 @@ class BandsTable(TomlTable):
     infiltration_percent: Deviation | None = None
     heating_set_c: Deviation | None = None
     cooling_set_c: Deviation | None = None
+    slat_width_mm: Deviation | None = None
+    slat_reflectance: Deviation | None = None
 
 
 def rooms_of(building: Building, table: RoomsTable | GroupTable, place: str) -> set[str]:

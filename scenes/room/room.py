@@ -55,7 +55,7 @@ from scenes.room.operation import Operation
 from scenes.room.operation_tables import OperationTables
 from scenes.room.options import RoomOptions
 from scenes.room.picture_hours import wanted_hours
-from scenes.room.sensitivities import heat_sensitivities, light_sensitivities
+from scenes.room.sensitivities import heat_sensitivities, light_sensitivities, rooms_at_ends
 from scenes.room.shading import (
     RuledYear,
     control_signals,
@@ -64,6 +64,7 @@ from scenes.room.shading import (
     ruled_year,
     temperature_conditions,
 )
+from scenes.room.slats import MovedSlats, moved_zones, room_slats
 from scenes.room.solar import SeasonalOutdoors, seasonal_outdoors
 from scenes.room.spectral import explored_colour, room_spectral
 from scenes.room.zone import (
@@ -135,7 +136,8 @@ def compute_room(
     if lit.sensitivities is not None:
         with times.stage("sensitivities"):
             terrain = (lit.zone.operation or OperationTables()).terrain
-            (of_heat,) = heat_sensitivities([lit.zone], weather, options.heat_step_s, terrain=terrain)
+            moved = list(rooms_at_ends([lit.zone]))
+            (of_heat,) = heat_sensitivities([lit.zone], weather, options.heat_step_s, terrain=terrain, moved=moved)
             lit = lit.with_sensitivities(of_heat, options.sampling.seed)
     return replace(lit, seconds=times.seconds).with_heat(heat)
 
@@ -199,6 +201,7 @@ def lit_room(
     hours = wanted_hours(options.outputs.picture_hours, weather.midpoints, room.skies.lit)
     year = dgp = rated = explored = spectral = sensitivities = samples = plan = None
     dgp_error = 0.0
+    slats: tuple[MovedSlats, ...] = ()
     times = StageTimes()
 
     with times.stage("daylight"):
@@ -238,7 +241,8 @@ def lit_room(
             spectral = room_spectral(room, light, state, daylight, progress=progress)
     if options.outputs.derives:
         with times.stage("sensitivities"):
-            sensitivities, samples = light_sensitivities(room, light, state, daylight, year, spectral)
+            slats = tuple(room_slats(room, light))
+            sensitivities, samples = light_sensitivities(room, light, state, daylight, year, spectral, slats=slats)
     with times.stage("thermal"):
         surfaces = surfaces or zone_surfaces(room)
         if outdoors is None:
@@ -246,6 +250,9 @@ def lit_room(
         zone = room_zone(room, surfaces, outdoors, state, daylight, ruled=ruled, progress=progress)
         if choice is not None:
             zone = replace(zone, alternatives=choice.alternatives)
+    if slats:
+        with times.stage("sensitivities"):
+            zone = replace(zone, moved=moved_zones(slats, zone, outdoors, state, daylight, ruled))
     return DaylitRoom(
         space,
         daylight,

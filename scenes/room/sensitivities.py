@@ -39,6 +39,7 @@ from scenes.room.bands import (
 )
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import RoomLight
+from scenes.room.slats import MovedSlats
 from scenes.room.zone import RoomZone, balances, climate, lamp_daylight, lamp_power, per_window
 from scenes.uncertain_inputs import INPUTS
 from thermal.balance import ZoneResult
@@ -86,6 +87,10 @@ class Change:
     value: float  # of the input
     illuminance: Array  # [S + 1, L] of the sensors, the eye last [lx]
     relative_error: float  # standard error over value of the sensors' mean
+    step: float = 0.0  # over which counts are central differences; 0: their smoothed slope
+    # [L] with the input a step lower and higher; None: by the light at the eye, the glare sources unchanged
+    dgp: tuple[Array, Array] | None = None
+    melanopic: Array | None = None  # [L] of melanopic EDI at the eye [lx]; None: the ratio to illuminance stays
 
 
 def light_sensitivities(
@@ -95,16 +100,20 @@ def light_sensitivities(
     daylight: DaylightResult,
     year: pd.DataFrame | None = None,
     spectral: SpectralYear | None = None,
+    *,
+    slats: Sequence[MovedSlats] = (),
 ) -> tuple[pd.DataFrame, LightSamples | None]:
     """Derivatives of the room's light by its inputs, see `sensitivity_table`; samples for bands, if asked for.
 
     Args:
         state: [H, G] of the shading.
+        slats: the room with other slats, see `room_slats`.
         year: `annual_glare`; None: no hours of glare.
         spectral: None: no melanopic light.
     """
     figures = _LightFigures(room, light, state, daylight, year, spectral)
-    changes = list(light_changes(room, light, state))
+    wanted = {"glare": year is not None, "melanopic": spectral is not None}
+    changes = list(light_changes(room, light, state, slats=slats, **wanted))
     table = pd.concat([figures.rows(one) for one in changes if one.key != "tracing"], ignore_index=True)
     samples = None
     if room.options.outputs.bands:
@@ -113,8 +122,19 @@ def light_sensitivities(
     return table, samples
 
 
-def light_changes(room: RoomInputs, light: RoomLight, state: NDArray[np.int64]) -> Iterator[Change]:
-    """What the light of a room depends on, and how."""
+def light_changes(
+    room: RoomInputs,
+    light: RoomLight,
+    state: NDArray[np.int64],
+    *,
+    slats: Sequence[MovedSlats] = (),
+    glare: bool = False,
+    melanopic: bool = False,
+) -> Iterator[Change]:
+    """What the light of a room depends on, and how.
+
+    Args: slats: the room with other slats; glare, melanopic: whether DGP and melanopic EDI are derived by these.
+    """
     rows, scene = light.states(state), light.scene
     lit = _of_all(light, rows)
     groups, interior = scene.by_groups, scene.interior
@@ -145,7 +165,11 @@ def light_changes(room: RoomInputs, light: RoomLight, state: NDArray[np.int64]) 
     # sensors share paths: their errors are taken as one
     errors = np.append(relative_error_of_mean(values, noise), relative)
     yield Change("tracing", 0.0, lit * errors[:, None], 0.0)
-    tilt = _by_tilt(room, light, rows)
+    for one in slats:
+        of_dgp = one.dgp(state) if glare else None
+        of_melanopic = one.melanopic_slope(state) if melanopic else None
+        yield Change(one.key, one.value, one.slope(state), relative, one.step, of_dgp, of_melanopic)
+    tilt = None if any(one.key == "tilt_deg" for one in slats) else _by_tilt(room, light, rows)
     if tilt is not None:
         value, derivative = tilt
         yield Change("tilt_deg", value, derivative, relative)
@@ -190,6 +214,18 @@ def bell(values: Array, limit: float | Array, width: float) -> Array:
     return density
 
 
+def count_slope(values: Array, slope: Array, limit: float, width: float, step: float) -> Array:
+    """Derivative of Phi((value - limit) / width) by an input by which the values have a slope.
+
+    Args: step: of the input, for a central difference; 0: none.
+    """
+    if step <= 0:
+        return bell(values, limit, width) * slope
+    high, low = (ndtr((values + by * slope - limit) / width) for by in (step, -step))
+    difference: Array = (high - low) / (2 * step)
+    return difference
+
+
 class _LightFigures:
     """The figures of a room's light, smoothed, and their derivatives by that of the illuminance."""
 
@@ -208,13 +244,18 @@ class _LightFigures:
         self._values = daylight.illuminance[self._lit].T.astype(float)  # [S, L]
         counted = room.skies.once(lm83_hours, room.weather)
         self._counted, self._hours = counted[self._lit], int(counted.sum())
-        smooth = ndtr((self._values - TARGET_LX) / WIDTHS["da300"]) * self._counted
-        self._da = 100.0 * smooth.sum(axis=1) / self._hours
+        self._da = self._autonomy(self._values)
         self._eye = light.eye(state).astype(float)
         self._year = None if year is None else year.iloc[self._lit]
         self._used = room.occupied[self._lit]
         self._spectral = None if spectral is None else spectral.eye.iloc[self._lit]
         self._daylight = daylight
+
+    def _autonomy(self, values: Array) -> Array:
+        """Smoothed DA of each sensor [S] [%] by illuminance [S, L]."""
+        smooth = ndtr((values - TARGET_LX) / WIDTHS["da300"]) * self._counted
+        share: Array = 100.0 * smooth.sum(axis=1) / self._hours
+        return share
 
     def rows(self, change: Change) -> pd.DataFrame:
         """The rows of one input."""
@@ -227,24 +268,38 @@ class _LightFigures:
         of_plane, of_eye = change.illuminance[self._plane], change.illuminance[-1]
         hours, step_h = self._room.skies.hours, self._room.weather.step_h
         yield "mean_illuminance_lx", (self._values.sum(axis=1).mean() / hours, of_plane.sum(axis=1).mean() / hours)
-        slope = bell(self._values, TARGET_LX, WIDTHS["da300"]) * self._counted * of_plane
+        step = change.step
+        slope = count_slope(self._values, of_plane, TARGET_LX, WIDTHS["da300"], step) * self._counted
         of_sensors = 100.0 * slope.sum(axis=1) / self._hours
         yield "da300", (float(self._da.mean()), float(of_sensors.mean()))
         width = WIDTHS["sda300_50"]
-        area = bell(self._da, HALF, width) * of_sensors
-        yield "sda300_50", (100.0 * float(ndtr((self._da - HALF) / width).mean()), 100.0 * float(area.mean()))
+        if step > 0:
+            low, high = (
+                ndtr((self._autonomy(self._values + by * of_plane) - HALF) / width).mean() for by in (-step, step)
+            )
+            area = float(high - low) / (2 * step)
+        else:
+            area = float((bell(self._da, HALF, width) * of_sensors).mean())
+        yield "sda300_50", (100.0 * float(ndtr((self._da - HALF) / width).mean()), 100.0 * area)
         if self._year is not None:
             dgp, by_eye = dgp_and_slope(self._year["dgp"].to_numpy(float), self._year["ev"].to_numpy(float))
             width, used = WIDTHS["glare_hours"], self._used
             value = step_h * ndtr((dgp - GLARE) / width)[used].sum()
-            yield "glare_hours", (value, step_h * float((bell(dgp, GLARE, width) * by_eye * of_eye)[used].sum()))
+            if change.dgp is None:
+                of_hours = count_slope(dgp, by_eye * of_eye, GLARE, width, step)
+            else:
+                low, high = (ndtr((end - GLARE) / width) for end in change.dgp)
+                of_hours = (high - low) / (2 * step)
+            yield "glare_hours", (value, step_h * float(of_hours[used].sum()))
         if self._spectral is not None:
             seen = self._spectral["melanopic_edi_lx"].to_numpy(float)
             ratio = np.divide(seen, self._eye, out=np.zeros_like(seen), where=self._eye > 0)
-            by, width, used = ratio * of_eye, WIDTHS["melanopic_hours"], self._used
+            by = ratio * of_eye if change.melanopic is None else change.melanopic
+            width, used = WIDTHS["melanopic_hours"], self._used
             yield "melanopic_edi_mean_lx", (seen[used].mean(), float(by[used].mean()))
             value = step_h * ndtr((seen - MELANOPIC_BY_DAY) / width)[used].sum()
-            yield "melanopic_hours", (value, step_h * float((bell(seen, MELANOPIC_BY_DAY, width) * by)[used].sum()))
+            of_hours = count_slope(seen, by, MELANOPIC_BY_DAY, width, step)
+            yield "melanopic_hours", (value, step_h * float(of_hours[used].sum()))
         tables = self._room.operation
         if tables is not None and tables.gains.dims:
             powers = [self._lamps(sign * change.illuminance, change) for sign in (1.0, -1.0)]
@@ -477,10 +532,13 @@ def heat_sensitivities(
     *,
     terrain: str = "suburbs",
     air_links: Array | None = None,
+    moved: Sequence[tuple[Sequence[RoomZone], Sequence[RoomZone]]] = (),
 ) -> list[pd.DataFrame]:
     """Derivatives of each room's temperatures and loads: an input is moved in all rooms together.
 
     Central differences over `STEP_SHARE` of the input's deviation to either side.
+
+    Args: moved: the rooms with each of their `moved_inputs` a step lower and higher.
     """
 
     def figures(moved: Sequence[RoomZone]) -> list[dict[str, float]]:
@@ -499,7 +557,25 @@ def heat_sensitivities(
         for table, room, value, up, down in zip(tables, rooms, base, *ends, strict=True):
             of_figures = [(name, value[name], (up[name] - down[name]) / (2 * step), 0.0) for name in value]
             table.append(sensitivity_table(key, input_value(room, key), of_figures))
+    for key, (low, high) in zip(moved_inputs(rooms), moved, strict=True):
+        for table, room, value, down, up in zip(tables, rooms, base, figures(low), figures(high), strict=True):
+            for one in room.moved:
+                if one.key == key:
+                    of_figures = [(name, value[name], (up[name] - down[name]) / (2 * one.step), 0.0) for name in value]
+                    table.append(sensitivity_table(key, one.value, of_figures))
     return [pd.concat(table, ignore_index=True) for table in tables]
+
+
+def moved_inputs(rooms: Sequence[RoomZone]) -> list[str]:
+    """The inputs of the slats that some of the rooms have."""
+    return list(dict.fromkeys(one.key for room in rooms for one in room.moved))
+
+
+def rooms_at_ends(rooms: Sequence[RoomZone]) -> Iterator[tuple[list[RoomZone], list[RoomZone]]]:
+    """The rooms with each of their `moved_inputs` a step lower and higher; a room without it as it is."""
+    for key in moved_inputs(rooms):
+        ends = [next(((one.low, one.high) for one in room.moved if one.key == key), (room, room)) for room in rooms]
+        yield [low for low, _ in ends], [high for _, high in ends]
 
 
 def heat_figures(room: RoomZone, result: ZoneResult, weather: Weather) -> dict[str, float]:

@@ -191,6 +191,7 @@ class RoomZone:
     alternatives: RoomAlternatives | None = None  # of shading by the room's temperature
     # [H] light of the lamps on the work plane [lx]; None where it is not known
     lamp_lx: FloatArray | None = None
+    moved: tuple[MovedZone, ...] = ()  # with other slats, for sensitivities
 
     @property
     def control(self) -> TemperatureControl | None:
@@ -245,11 +246,27 @@ class RoomZone:
         """The zone of an equal room (`bim.to_thermal.same_surfaces`), among its own neighbours."""
         zone = replace(self.zone, name=space.label)
         room = replace(self.room, zone=zone, neighbours=surface_neighbours(space))
-        return replace(self, space=space, room=room)
+        moved = tuple(one.each(lambda end: end.moved_to(space)) for one in self.moved)
+        return replace(self, space=space, room=room, moved=moved)
 
     def with_view_factors(self, among: FloatArray) -> RoomZone:
         """The room with view factors [N, N] between its surfaces, then its windows."""
         return replace(self, room=replace(self.room, zone=replace(self.zone, view_factors=among)))
+
+
+@dataclass(frozen=True, slots=True)
+class MovedZone:
+    """A zone with an input of its slats a step lower and higher, in the same shading states."""
+
+    key: str  # of `scenes.uncertain_inputs`
+    value: float  # of the input
+    step: float
+    low: RoomZone
+    high: RoomZone
+
+    def each(self, change: Callable[[RoomZone], RoomZone]) -> MovedZone:
+        """The same with both zones changed."""
+        return replace(self, low=change(self.low), high=change(self.high))
 
 
 BY_ROOM = "the room's temperature or load"  # the reason of a move that the balance decides

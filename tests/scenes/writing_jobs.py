@@ -79,6 +79,13 @@ def _goniophotometer(inputs: Path, out: Path) -> list[object]:
     return ["bsdf", "interpolate", inputs / "sample.txt", *words]
 
 
+def _layers(inputs: Path, out: Path) -> list[object]:
+    slats = "[[layers]]\nslats = { width = 0.08, spacing = 0.072, visible = 0.5 }\ngap = { width = 0.1 }\n"
+    pane = "[[layers]]\nthickness = 0.004\nsolar = [0.84, 0.075, 0.075]\n"
+    (inputs / "layers.toml").write_text(slats + pane)
+    return ["bsdf", "system", inputs / "layers.toml", "--paths", 16, "--out", out]
+
+
 def _corrected(inputs: Path, out: Path) -> list[object]:
     (inputs / "office.ifc").write_bytes(OFFICE.read_bytes())
     (inputs / "office.corrections.toml").write_text("north = 30.0\n")
@@ -159,6 +166,7 @@ JOBS = {
     "bsdf thermal": Job(lambda _, out: ["bsdf", "thermal", VENETIAN_BLIND, "--out", out], "out.csv"),
     "bsdf thermal --toml": Job(lambda _, out: ["bsdf", "thermal", VENETIAN_BLIND, "--toml", out], "out.toml"),
     "bsdf generate": Job(lambda _, out: [*GENERATE, out], "out.xml"),
+    "bsdf system": Job(_layers, "out.xml"),
     "bsdf library": Job(lambda _, out: ["bsdf", "library", "--glazing", "triple low-e", "--out", out], "out.xml"),
     "bsdf interpolate": Job(_goniophotometer, "out.xml"),
     "bsdf combine": Job(lambda _, out: ["bsdf", "combine", VENETIAN_BLIND, VENETIAN_BLIND, "--out", out], "out.xml"),
