@@ -119,14 +119,14 @@ class _Apart:
     """A subprocess that does one task after the other."""
 
     idle: ClassVar[list[_Apart]] = []
+    taking: ClassVar[threading.Lock] = threading.Lock()  # threads take one at a time
 
     @classmethod
     def waiting(cls) -> _Apart:
         """One that has nothing to do, else a new one."""
-        try:
-            return cls.idle.pop()
-        except IndexError:
-            return cls()
+        with cls.taking:
+            one = cls.idle.pop() if cls.idle else None
+        return one or cls()
 
     def __init__(self) -> None:
         paths = os.pathsep.join(path or os.getcwd() for path in sys.path)
