@@ -223,7 +223,7 @@ def _in_its_opening(filling: Filling, plane: Plane) -> tuple[Plane, list[Issue]]
     off = max(heights.min(), -heights.max(), 0.0)
     if off < OUT_OF_WALL:
         return plane, []
-    values = {"element": filling.name, "offset_mm": 1000 * off}
+    values = {"element": filling.name, "offset_mm": float(1000 * off)}
     if off < ASTRAY:
         return plane, [Issue("glass-out-of-opening", filling.guid, values)]
     middle = 0.5 * (heights.min() + heights.max())

@@ -14,7 +14,7 @@ from __future__ import annotations
 import json
 import logging
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
 from os import PathLike
@@ -29,7 +29,7 @@ from bim.fenestration import AngularGValue, PlainGlass, ShadingState
 from bim.ifc.corrections import corrections_beside, corrections_file
 from bim.ifc.head import check_head
 from bim.model import Building, Construction, Element, Face, Georeference, MaterialLayer, Space, SpaceGroup, Window
-from bim.names import AmbiguousName, UnknownName, has_words, unknown_room
+from bim.names import AmbiguousName, UnknownName, has_words, label_of, name_key, unknown_room
 from bim.report.issue import Effect, Issue, Phrase, Term, issue_text
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import read_json, sha256
@@ -63,6 +63,10 @@ RECORDS = {
 }
 PLAIN = (str, int, float, bool, type(None))
 SEQUENCES = {"tuple": tuple, "list": list}
+# of a STEP file: the attributes of what has rooms, a text in them, letters beyond ASCII in a text
+NAMED = re.compile(rb"=\s*IFC(?:SPACE|ZONE|BUILDINGSTOREY|FACILITYPART)\s*\(((?:[^';]|'[^']*')*);", re.IGNORECASE)
+TEXT = re.compile(r"'((?:[^']|'')*)'")
+WIDE = re.compile(r"\\X2\\((?:[0-9A-Fa-f]{4})+)\\X0\\")
 READER = "bim.building_file"  # the module that reads and stores; its source is a part of the key
 
 log = logging.getLogger(__name__)
@@ -388,23 +392,32 @@ def check_building_file(path: str | PathLike[str]) -> None:
 
 
 def check_room_names(paths: Sequence[Path], rooms: Sequence[str]) -> None:
-    """Refuse names that are like none of IFC files, before anything heavy is loaded.
+    """Refuse names that no room of IFC files can have, before anything heavy is loaded.
 
-    A name whose text is in a file is left to the reader.
+    The text of the files is searched for a space, zone or storey of each name. The model is opened
+    only for a name that is not found so.
 
     Raises: `DataError`.
     """
     if not (rooms and paths and all(map(is_ifc, paths))):
         return
-    texts = [path.read_bytes().lower() for path in paths]
-    # letters beyond ASCII are written in another form
-    parts = {room: [part.encode() for part in re.findall(r"[ -~]+", room.lower())] for room in rooms}
-    absent = [room for room, of in parts.items() if not any(of and all(one in text for one in of) for text in texts)]
+    names = {key for path in paths for key in _written_names(path.read_bytes())}
+    absent = [room for room in rooms if name_key(room) not in names]
     if absent:
         from bim.ifc.project import open_all
         from bim.ifc.spaces import check_rooms
 
         check_rooms([*open_all(paths).values()], absent, paths[0], corrections_beside(paths[0]).room_names)
+
+
+def _written_names(text: bytes) -> Iterator[str]:
+    """Keys of the texts of each space, zone and storey of a STEP file, and of its two names as a label."""
+    for entity in NAMED.finditer(text):
+        texts = [one.replace("''", "'") for one in TEXT.findall(entity[1].decode("latin-1"))]
+        texts = [WIDE.sub(lambda code: bytes.fromhex(code[1]).decode("utf-16-be", "replace"), one) for one in texts]
+        yield from map(name_key, texts)
+        # GlobalId, Name, then a description or an object type if any, LongName
+        yield from (name_key(label_of(texts[1], one, "")) for one in texts[2:])
 
 
 def refuse_unread_format(path: Path) -> None:

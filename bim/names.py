@@ -63,10 +63,10 @@ def plain_text(text: str) -> str:
 
 def nearest(wanted: str, names: Iterable[str]) -> list[str]:
     """The names, each once, those most like the wanted one first; capitals do not count."""
-    key = _key(wanted)
+    key = name_key(wanted)
 
     def likeness(name: str) -> float:
-        other = _key(name)
+        other = name_key(name)
         part = 1.0 if key and key in other else 0.0
         return part + difflib.SequenceMatcher(None, key, other).ratio()
 
@@ -100,9 +100,11 @@ def item_named(items: Sequence[T], wanted: str, kind: str) -> T:
     """
     matches = [item for item in items if item.guid == wanted]
     matches = matches or [i for i in items if wanted in (i.name, i.long_name, i.label)]
-    key = _key(wanted)
-    matches = matches or [item for item in items if key and key in map(_key, (item.name, item.long_name, item.label))]
-    matches = matches or [item for item in items if key and key in map(_key, _names_of_parts(item))]
+    key = name_key(wanted)
+    matches = matches or [
+        item for item in items if key and key in map(name_key, (item.name, item.long_name, item.label))
+    ]
+    matches = matches or [item for item in items if key and key in map(name_key, _names_of_parts(item))]
     if not matches:
         there = listed(wanted, (item.label for item in items))
         raise UnknownName(f"no {kind} {wanted!r}; there are: {there}")
@@ -117,7 +119,7 @@ def item_named(items: Sequence[T], wanted: str, kind: str) -> T:
 
 def has_words(text: str, words: str) -> bool:
     """Whether a text has words in a row, whatever their capitals."""
-    return re.search(rf"(?<!\w){re.escape(_key(words))}(?!\w)", _key(text)) is not None
+    return re.search(rf"(?<!\w){re.escape(name_key(words))}(?!\w)", name_key(text)) is not None
 
 
 def unknown_room(error: UnknownName | AmbiguousName, wanted: str, zones: Iterable[str]) -> str:
@@ -141,7 +143,8 @@ def natural_key(name: str) -> list[tuple[int, str]]:
     return [(int(part), "") if part.isdecimal() else (sys.maxsize, part) for part in parts if part]
 
 
-def _key(name: str) -> str:
+def name_key(name: str) -> str:
+    """A name without what makes no difference: capitals and runs of spaces."""
     return " ".join(name.split()).casefold()
 
 

@@ -14,8 +14,8 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextvars import ContextVar
+from concurrent.futures import Future, ProcessPoolExecutor
+from contextvars import ContextVar, copy_context
 from multiprocessing import connection, get_context, parent_process
 from multiprocessing.process import BaseProcess
 from typing import Any, ClassVar
@@ -88,7 +88,7 @@ def answer_apart(function: Callable, *arguments: Any, limit_s: float, told: Told
         limit_s: seconds until it is stopped.
     Raises: `ProcessEnded` where it was stopped or died; what the function raises otherwise.
     """
-    apart = _Apart.idle.pop() if _Apart.idle else _Apart()
+    apart = _Apart.waiting()
     try:
         value, error = apart.answer((function, arguments), limit_s, told or (lambda text: None))
     except BaseException:
@@ -100,10 +100,33 @@ def answer_apart(function: Callable, *arguments: Any, limit_s: float, told: Told
     return value
 
 
+def beside(function: Callable, *arguments: Any, limit_s: float) -> Future:
+    """Begin `answer_apart(function, *arguments, limit_s=limit_s)`; its future result."""
+    future: Future = Future()
+    context = copy_context()
+
+    def wait() -> None:
+        try:
+            future.set_result(context.run(answer_apart, function, *arguments, limit_s=limit_s))
+        except BaseException as error:
+            future.set_exception(error)
+
+    threading.Thread(target=wait, name="answer-beside", daemon=True).start()
+    return future
+
+
 class _Apart:
     """A subprocess that does one task after the other."""
 
     idle: ClassVar[list[_Apart]] = []
+    taking: ClassVar[threading.Lock] = threading.Lock()  # threads take one at a time
+
+    @classmethod
+    def waiting(cls) -> _Apart:
+        """One that has nothing to do, else a new one."""
+        with cls.taking:
+            one = cls.idle.pop() if cls.idle else None
+        return one or cls()
 
     def __init__(self) -> None:
         paths = os.pathsep.join(path or os.getcwd() for path in sys.path)

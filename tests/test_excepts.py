@@ -20,6 +20,7 @@ BROAD = {  # module and function: why
     "mitsuba_cfs/files.py: replacing": "removes the half-written file and raises again",
     "mitsuba_cfs/trace/kernels/estimate.py: accumulate": "stores the batches and raises again",
     "mitsuba_cfs/processes.py: answer_apart": "ends the process and raises again",
+    "mitsuba_cfs/processes.py: wait": "an error is that of the future, which raises it",
     "mitsuba_cfs/processes.py: _work": "sends the error to the parent process, which raises it",
     "scenes/cluster.py: _outcome": "an error of a worker decides which task begins again",
     "scenes/workers.py: _outcome": "sends the error to the parent process, which raises it",

@@ -225,7 +225,7 @@ def _open_pairs(records: Sequence[SpaceRecord], openings: Sequence[Passage], sou
     named = {record.guid: record for record in records}
     issues = []
     for rooms, of_pair in by_pair.items():
-        pair = sorted((named[guid] for guid in rooms), key=lambda room: room.label)
+        pair = sorted((named[guid] for guid in rooms), key=lambda room: (room.label, room.guid))
         names = _names_to_join(pair, records)
         values = {
             "rooms": tuple(room.label for room in pair),

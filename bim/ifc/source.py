@@ -36,7 +36,7 @@ from bim.ifc.project import (
     storeys_in,
 )
 from bim.ifc.quantities import QuantityScales
-from bim.ifc.shapes import NO_ELEMENTS, Shape, read_shapes
+from bim.ifc.shapes import NO_ELEMENTS, Shape, half_of_shapes, read_shapes
 from bim.ifc.spaces import check_rooms
 from bim.ifc.surface_styles import SurfaceStyle
 from bim.ifc.transparent import judged_transparent
@@ -274,6 +274,8 @@ def read_source(
     models, damage = open_all(files), Damage()
     check_rooms([*models.values()], rooms, path, corrections.room_names)
     check_storeys([*models.values()], storeys, path)
+    whole = not linked and not storeys and Path(path).suffix.lower() == ".ifc"
+    half = half_of_shapes(Path(path)) if whole else None
     lengths = [issue for one in models.values() for issue in length_issues(one)]
     model, issues = one_model(models)
     issues += keep_storeys(model, storeys, path, damage)
@@ -289,7 +291,7 @@ def read_source(
     latitude, longitude, elevation, site = site_location(model)
     check_materials(model, corrections)
     removed = corrections.removed(model)
-    shapes, faults = read_shapes(model, lambda fraction: tell("geometry", fraction), without=removed)
+    shapes, faults = read_shapes(model, lambda fraction: tell("geometry", fraction), without=removed, half=half)
     unglazed = corrections.unglazed(model)
     shapes |= {key: opaque(shapes[key]) for key in unglazed if key in shapes}
     shapes, phantoms = judged_transparent(model, shapes, damage)

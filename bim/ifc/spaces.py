@@ -192,10 +192,10 @@ def check_rooms(
     file: str | PathLike[str],
     corrected: Iterable[RoomName] = (),
 ) -> None:
-    """Refuse names that are like no name of a space, zone or storey in the models of a building.
+    """Refuse names that no room of a building can have.
 
-    A name that has words of one of these, or the reverse, may be that of rooms that are joined, cut
-    or left out.
+    A name with the words of a space, zone or storey of the models may be that of rooms that are
+    joined, cut or left out; one that is only a part of such a name is that of none.
 
     Args: corrected: names that the corrections state.
 
@@ -210,7 +210,7 @@ def check_rooms(
     names = {*zones, *storeys, *(text for one in drawn for text in (one.guid, one.name, one.long_name))}
     names |= {text or "" for one in corrected for text in (one.name, one.long_name)}
     for room in rooms:
-        if any(has_words(room, name) or has_words(name, room) for name in names if name.strip()):
+        if any(has_words(room, name) for name in names if name.strip()):
             continue
         try:
             item_named(drawn, room, "space")
