@@ -3,9 +3,12 @@
     light of a row  = sum over points m of share[row, m] E_sun[m]                 outdoors to the windows
     light of sensor = sum over paths i of w[i] tau(way[i]) E_sun[m(i)]            outdoors, straight through
                     = sum over specular paths n of tau_n(sun) E_n[s] E_normal     beam reflected by the room
+                    = sum over specular paths n of tau_n(sun) O_n[s] E_normal     beam of the sun's disc
+                    + sum over points j of w[s, j] l_n[j] f(sun, s) E_normal      light that windows scatter
 
-Points, weights, E_sun and E_n are geometry: they are traced with open windows and stored.  A system adds
-tau, the transmittance of its straight beam, so that another system traces none of these rays again.
+Points, weights, E_sun, E_n, O_n and the sunlit share l_n are geometry: they are traced with open windows and
+stored.  A system adds tau, the transmittance of its straight beam, and its BSDF f, so that another system
+traces none of these rays again.
 """
 
 from __future__ import annotations
@@ -19,12 +22,14 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from mitsuba_cfs.matrices.cache import CacheEntry, MatrixCache
+from mitsuba_cfs.matrices.packed import PackedArray
 from mitsuba_cfs.trace.kernels.estimate import cache_entry
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints
 from mitsuba_cfs.trace.sun.reflected import SunShares, ViewShares, light_of_rows, view_shares, window_shares
 from mitsuba_cfs.trace.sun.sun_at_points import SunAtPoints, sun_at_points
+from mitsuba_cfs.trace.sun.sun_discs import SunDiscs
 from mitsuba_cfs.trace.sun.sunlit_sensors import OpenBeamLight
 
 MOST_STORED = 1 << 25  # bytes of an entry: larger ones are traced again
@@ -121,6 +126,41 @@ def open_beam_light(
     return stored
 
 
+@dataclass(frozen=True, slots=True)
+class OpenSun:
+    """The direct sun of sensors through open windows in some batches B."""
+
+    edges: Sequence[NDArray[np.float32]]  # [N][B, G, m] light from discs that an edge crosses, by specular path
+    visible: Mapping[int, PackedArray]  # [S, J] whether sensors see the points on a group
+    sunlit: Mapping[tuple[int, int], PackedArray]  # [J, Q] share of the suns there, by path and group; none: 0
+
+
+def open_discs(scenes: SunScenes, inputs: tuple[object, ...], trace: Callable[[], list[SunDiscs]]) -> list[SunDiscs]:
+    """The sun's disc at sensors through open windows by specular path [N], cached or as `trace` has it.
+
+    Args: inputs: that it depends on beside the scenes.
+    """
+    entry = scenes.entry("sun discs", *inputs)
+    stored = None if entry is None else entry.read(_discs_of)
+    if stored is None:
+        stored = trace()
+        _write(entry, [_disc_arrays(discs) for discs in stored])
+    return stored
+
+
+def open_sun(scenes: SunScenes, inputs: tuple[object, ...], trace: Callable[[], OpenSun]) -> OpenSun:
+    """The direct sun of sensors through open windows in some batches, cached or as `trace` has it.
+
+    Args: inputs: as of `open_discs`, and the batches.
+    """
+    entry = scenes.entry("sun on windows", *inputs)
+    stored = None if entry is None else entry.read(_open_sun_of)
+    if stored is None:
+        stored = trace()
+        _write(entry, [_open_sun_arrays(stored)])
+    return stored
+
+
 def _sun_of(scenes: SunScenes, places: Sequence[SurfacePoints], suns: Suns) -> list[SunAtPoints]:
     return sun_at_points(scenes.outside, places, suns.direction)
 
@@ -182,3 +222,37 @@ def _views_of(data: Arrays, count: int) -> list[tuple[ViewShares, SunAtPoints]] 
 
 def _beams_of(data: Arrays) -> list[OpenBeamLight] | None:
     return [OpenBeamLight(part["hours"], part["light"]) for part in _parts(data)] or None
+
+
+def _disc_arrays(discs: SunDiscs) -> Arrays:
+    return {"pair": discs.pair, "group": discs.group, "light": discs.light, "crossed": discs.crossed}
+
+
+def _discs_of(data: Arrays) -> list[SunDiscs] | None:
+    parts = _parts(data)
+    return [SunDiscs(one["pair"], one["group"], one["light"], one["crossed"]) for one in parts] or None
+
+
+def _open_sun_arrays(sun: OpenSun) -> Arrays:
+    """Groups and paths are numbered in the names; paths without sun have none."""
+    arrays: dict[str, NDArray[Any]] = {"paths": np.array(len(sun.edges)), "groups": np.array(sorted(sun.visible))}
+    for n, edges in enumerate(sun.edges):
+        arrays |= PackedArray.of(edges).arrays(f"edges {n}")
+    for g, visible in sun.visible.items():
+        arrays |= visible.arrays(f"visible {g}")
+    for (n, g), sunlit in sun.sunlit.items():
+        arrays |= sunlit.arrays(f"sunlit {n} {g}")
+    return arrays
+
+
+def _open_sun_of(data: Arrays) -> OpenSun | None:
+    (part,) = _parts(data)
+    edges = [PackedArray.of_arrays(part, f"edges {n}").whole() for n in range(int(part["paths"]))]
+    groups = [int(g) for g in part["groups"]]
+    sunlit = {
+        (n, g): PackedArray.of_arrays(part, f"sunlit {n} {g}")
+        for n in range(len(edges))
+        for g in groups
+        if f"sunlit {n} {g} shape" in part
+    }
+    return OpenSun(edges, {g: PackedArray.of_arrays(part, f"visible {g}") for g in groups}, sunlit)
