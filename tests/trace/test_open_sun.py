@@ -153,3 +153,65 @@ def test_packed_arrays_are_the_same_arrays():
         np.testing.assert_array_equal(read.whole(), array.astype(np.float32))
         assert read.shape == array.shape and read.empty == (not array.any())
     assert PackedArray.of(mixed > 0).values.size == 1
+
+
+def steep():
+    """Glass whose transmittance changes by a twentieth across the disc of a sun to the side."""
+    from mitsuba_cfs.trace.kernels.scattering import AngularScattering
+
+    return AngularScattering(np.linspace(0, 1, 257) ** 8, np.zeros(2))
+
+
+def disc_about(sun: np.ndarray, count: int = 200_000) -> np.ndarray:
+    """Directions [n, 3] even over the disc of a sun."""
+    from mitsuba_cfs.sky.sun import SUN_RADIUS
+
+    number = np.arange(count) + 0.5
+    radius, turn = SUN_RADIUS * np.sqrt(number / count), 2.399963 * number
+    x = np.cross(sun, [0.0, 0.0, 1.0])
+    x /= np.linalg.norm(x)
+    y = np.cross(sun, x)
+    ways = sun + (np.tan(radius) * np.cos(turn))[:, None] * x + (np.tan(radius) * np.sin(turn))[:, None] * y
+    return ways / np.linalg.norm(ways, axis=1)[:, None]
+
+
+def test_the_mean_of_a_beam_over_the_disc_is_that_of_many_directions():
+    from mitsuba_cfs.trace.sun.specular_paths import beam_transmittance
+
+    suns = np.array([towards(20, z) for z in (0, 40, 60, 75)])
+    local = np.stack([-suns[:, 0], suns[:, 2], -suns[:, 1]], axis=1)
+    expected = [
+        np.mean(np.interp(disc_about(sun)[:, 2], np.linspace(0, 1, 257), np.linspace(0, 1, 257) ** 8)) for sun in local
+    ]
+    assert beam_transmittance(steep(), local) == pytest.approx(expected, rel=5e-4)
+
+
+def test_half_a_disc_has_the_transmittance_of_its_visible_half():
+    """Of the disc's mean it would have 3 % too much or too little."""
+    from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
+    from mitsuba_cfs.trace.kernels.estimate import Stopping
+    from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
+
+    room, groups = rooms.test_room()
+    sun, far = towards(25, 60), 100.0
+    point = np.array([1.8, 1e-3, 1.8])
+    x = point[0] + far * sun[0] / -sun[1]  # where the line to the middle of the disc meets the cover's plane
+    errors = []
+    for low, high in ((-900, x), (x, 900)):
+        cover = rooms.quad((low, -far, 0), (high, -far, 0), (high, -far, 300), (low, -far, 300))
+        ways = disc_about(sun)
+        met = point[0] + (far + point[1]) * ways[:, 0] / -ways[:, 1]
+        visible = (met < low) | (met > high)
+        light = np.interp(-ways[:, 1], np.linspace(0, 1, 257), np.linspace(0, 1, 257) ** 8) * ways[:, 2] * visible
+        found = direct_sun_matrix(
+            room,
+            rooms.surfaces([(cover, 0.0)]),
+            groups,
+            [steep()],
+            point[None],
+            [[0, 0, 1]],
+            suns=sun[None],
+            stopping=Stopping(batches=64),
+        )
+        errors.append(found.values[0, 0] / SUN_SOLID_ANGLE / light.mean() - 1)
+    assert np.abs(errors).max() < 0.005, errors

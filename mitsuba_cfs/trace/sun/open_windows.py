@@ -29,7 +29,7 @@ from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints
 from mitsuba_cfs.trace.sun.reflected import SunShares, ViewShares, light_of_rows, view_shares, window_shares
 from mitsuba_cfs.trace.sun.sun_at_points import SunAtPoints, sun_at_points
-from mitsuba_cfs.trace.sun.sun_discs import SunDiscs
+from mitsuba_cfs.trace.sun.sun_discs import DiscEdges, SunDiscs
 from mitsuba_cfs.trace.sun.sunlit_sensors import OpenBeamLight
 
 MOST_STORED = 1 << 25  # bytes of an entry: larger ones are traced again
@@ -130,7 +130,7 @@ def open_beam_light(
 class OpenSun:
     """The direct sun of sensors through open windows in some batches B."""
 
-    edges: Sequence[NDArray[np.float32]]  # [N][B, G, m] light from discs that an edge crosses, by specular path
+    edges: Sequence[DiscEdges]  # discs that an edge crosses, by specular path [N]
     visible: Mapping[int, PackedArray]  # [S, J] whether sensors see the points on a group
     sunlit: Mapping[tuple[int, int], PackedArray]  # [J, Q] share of the suns there, by path and group; none: 0
 
@@ -237,7 +237,8 @@ def _open_sun_arrays(sun: OpenSun) -> Arrays:
     """Groups and paths are numbered in the names; paths without sun have none."""
     arrays: dict[str, NDArray[Any]] = {"paths": np.array(len(sun.edges)), "groups": np.array(sorted(sun.visible))}
     for n, edges in enumerate(sun.edges):
-        arrays |= PackedArray.of(edges).arrays(f"edges {n}")
+        arrays |= PackedArray.of(edges.light).arrays(f"edges {n}")
+        arrays |= PackedArray.of(edges.towards).arrays(f"edges towards {n}")
     for g, visible in sun.visible.items():
         arrays |= visible.arrays(f"visible {g}")
     for (n, g), sunlit in sun.sunlit.items():
@@ -247,7 +248,10 @@ def _open_sun_arrays(sun: OpenSun) -> Arrays:
 
 def _open_sun_of(data: Arrays) -> OpenSun | None:
     (part,) = _parts(data)
-    edges = [PackedArray.of_arrays(part, f"edges {n}").whole() for n in range(int(part["paths"]))]
+    edges = [
+        DiscEdges(*(PackedArray.of_arrays(part, f"{name} {n}").whole() for name in ("edges", "edges towards")))
+        for n in range(int(part["paths"]))
+    ]
     groups = [int(g) for g in part["groups"]]
     sunlit = {
         (n, g): PackedArray.of_arrays(part, f"sunlit {n} {g}")

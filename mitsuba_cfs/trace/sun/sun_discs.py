@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.directions import normalize
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
-from mitsuba_cfs.trace.kernels.sampling import batch_key, column, lattice, opaque, opaque_vector, vectors
+from mitsuba_cfs.trace.kernels.sampling import batch_key, column, lattice, opaque, opaque_vector, tables, vectors
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, SceneCache, TracedScene
 from mitsuba_cfs.trace.sun.specular_paths import (
     CLEAR,
@@ -64,16 +64,30 @@ class SunDiscs:
         return not len(self.pair) and not len(self.crossed)
 
     def add_to(
-        self, total: NDArray[np.float32], edges: NDArray[np.float32], transmittance: NDArray[np.floating]
+        self,
+        total: NDArray[np.float32],
+        edges: DiscEdges,
+        transmittance: NDArray[np.floating],
+        of_edges: NDArray[np.floating],
     ) -> None:
         """Add the light of the pairs through windows with a straight beam to a sum [B, G, S * Q].
 
-        Args: edges: of `crossed_discs` [B, G, m]; transmittance: of the beam in each group for each sun [G, Q].
+        Args:
+            edges: of the crossed discs.
+            transmittance: of the beam in each group, mean over the disc of each sun [G, Q].
+            of_edges: the same towards what is visible of the crossed discs [B, G, m].
         """
         tau = transmittance.astype(np.float32)
-        suns = tau.shape[1]
-        total[:, self.group, self.pair] += self.light * tau[self.group, self.pair % suns]
-        total[:, :, self.crossed] += edges * tau[:, self.crossed % suns]
+        total[:, self.group, self.pair] += self.light * tau[self.group, self.pair % tau.shape[1]]
+        total[:, :, self.crossed] += edges.light * of_edges.astype(np.float32)
+
+
+@dataclass(frozen=True, slots=True)
+class DiscEdges:
+    """Discs that an edge crosses, through each window group G in some batches B; light as of `SunDiscs`."""
+
+    light: NDArray[np.float32]  # [B, G, m]
+    towards: NDArray[np.float32]  # [B, G, m, 3] mean direction to what is visible; 0 where nothing is
 
 
 def sun_discs(around: SunScene, seed: int) -> SunDiscs:
@@ -93,16 +107,17 @@ def sun_discs(around: SunScene, seed: int) -> SunDiscs:
     return SunDiscs(number[whole], group[whole].astype(np.int16), light[whole], number[~is_uniform])
 
 
-def crossed_discs(around: SunScene, crossed: NDArray[np.uint32], keys: mi.UInt32) -> NDArray[np.float32]:
-    """Light through each window group from discs that an edge crosses [B, G, m], see `SunDiscs`.
+def crossed_discs(around: SunScene, crossed: NDArray[np.uint32], keys: mi.UInt32) -> DiscEdges:
+    """The discs that an edge crosses.
 
     Args: crossed: numbers of the pairs [m]; keys: of the batches [B].
     """
     count = dr.width(keys)
     light = np.zeros((count, len(around.inside.groups), len(crossed)), dtype=np.float32)
+    towards = np.zeros((*light.shape, 3), dtype=np.float32)
     step = max(LANES // EDGE_RAYS // count, 1)
     for start in range(0, len(crossed), step):
-        some = crossed[start : start + step]
+        some, part = crossed[start : start + step], slice(start, start + step)
         lane = dr.arange(mi.UInt32, count * len(some) * EDGE_RAYS)
         row, each = lane // EDGE_RAYS, dr.opaque(mi.UInt32, len(some))
         batch = row // each
@@ -110,13 +125,18 @@ def crossed_discs(around: SunScene, crossed: NDArray[np.uint32], keys: mi.UInt32
         centre = dr.gather(mi.Vector3f, around.towards, sun)
         # the sensor's alone: an hour's light does not depend on those computed with it
         stream = mi.sample_tea_32(sensor, dr.gather(mi.UInt32, keys, batch))[0]
-        towards = disc_direction(centre, _spiral(lane - row * EDGE_RAYS, EDGE_RAYS, stream))
-        rays = _rays(around, sensor, towards)
-        dr.eval(rays)
-        values, group = (one.numpy().reshape(count, -1, EDGE_RAYS) for one in rays)
-        for g in np.unique(group[group != OPAQUE]):
-            light[:, g, start : start + step] = np.where(group == g, values, np.float32(0)).mean(axis=2)
-    return light
+        direction = disc_direction(centre, _spiral(lane - row * EDGE_RAYS, EDGE_RAYS, stream))
+        value, group = _rays(around, sensor, direction)
+        dr.eval(direction, value, group)
+        passed = np.unique(group.numpy())
+        for g in passed[passed != OPAQUE].tolist():
+            by_group = dr.select(group == opaque(g, mi.Int32), value, 0.0)
+            total = dr.block_sum(by_group, EDGE_RAYS)
+            sums = tables(total, dr.block_sum(direction * by_group, EDGE_RAYS))
+            mean = sums[1] / np.maximum(sums[0], np.float32(1e-9))[:, None]
+            light[:, g, part] = (sums[0] / EDGE_RAYS).reshape(count, -1)
+            towards[:, g, part] = mean.reshape(count, -1, 3)
+    return DiscEdges(light, towards)
 
 
 @dr.syntax
@@ -245,7 +265,8 @@ def visible_suns(
         around = SunScene(inside, way, place, upwards, vectors(apparent))
         discs = sun_discs(around, seed)
         by_cosine = np.zeros((1, len(groups), len(points) * len(suns)), dtype=np.float32)
-        discs.add_to(by_cosine, crossed_discs(around, discs.crossed, key), np.ones((len(groups), len(suns))))
+        edges, one = crossed_discs(around, discs.crossed, key), np.ones((len(groups), len(suns)))
+        discs.add_to(by_cosine, edges, one, np.ones(edges.light.shape))
         height = np.maximum(apparent[:, 2], SPREAD)
         shares = by_cosine.reshape(len(groups), len(points), len(suns)) / height
         found.append(VisibleSuns(apparent, np.minimum(shares, 1.0).astype(np.float32)))
