@@ -90,7 +90,7 @@ def test_other_systems_in_the_windows_trace_nothing_and_have_the_light_traced_af
 
 
 def test_a_cache_that_stores_nothing_of_the_sun_costs_the_rays_and_nothing_else(tmp_path, monkeypatch):
-    from mitsuba_cfs.trace.sun import open_windows
+    from mitsuba_cfs.matrices import stored_parts
 
     _, system, other, _ = systems()
     fresh = matrix(system, None)
@@ -100,7 +100,7 @@ def test_a_cache_that_stores_nothing_of_the_sun_costs_the_rays_and_nothing_else(
     file = tmp_path / "file"
     file.touch()
     same(matrix(system, MatrixCache(file / "below")), fresh)
-    monkeypatch.setattr(open_windows, "MOST_STORED", 64)
+    monkeypatch.setattr(stored_parts, "MOST_STORED", 64)
     same(matrix(system, MatrixCache(tmp_path / "small")), fresh)
     assert files(tmp_path / "small", "direct-sun") == 1
     assert files(tmp_path / "small", "sun-") == 0

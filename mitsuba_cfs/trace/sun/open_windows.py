@@ -23,6 +23,7 @@ from scipy import sparse
 
 from mitsuba_cfs.matrices.cache import CacheEntry, MatrixCache
 from mitsuba_cfs.matrices.packed import PackedArray
+from mitsuba_cfs.matrices.stored_parts import Arrays, parts_of, write_parts
 from mitsuba_cfs.trace.kernels.estimate import cache_entry
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
@@ -31,9 +32,6 @@ from mitsuba_cfs.trace.sun.reflected import SunShares, ViewShares, light_of_rows
 from mitsuba_cfs.trace.sun.sun_at_points import SunAtPoints, sun_at_points
 from mitsuba_cfs.trace.sun.sun_discs import DiscEdges, SunDiscs
 from mitsuba_cfs.trace.sun.sunlit_sensors import OpenBeamLight
-
-MOST_STORED = 1 << 25  # bytes of an entry: larger ones are traced again
-Arrays = Mapping[str, NDArray[Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +66,7 @@ def sunlit_windows(
         shares = window_shares(scenes.outside, samples=samples, places=places, seeds=seeds)
         stored = list(zip(shares, _sun_of(scenes, [one.places for one in shares], suns), strict=True))
         if all(one.rough is None for one in shares):
-            _write(entry, [_window_arrays(*one) for one in stored])
+            write_parts(entry, [_window_arrays(*one) for one in stored])
     return [light_of_rows(*one, scenes.outside, suns.direction, suns.strength) for one in stored]
 
 
@@ -103,7 +101,7 @@ def seen_through(
         for i, g in enumerate(missing):
             views[g] = whole[i * len(seeds) : (i + 1) * len(seeds)]
             if all(one.rough is None for one, _ in views[g]):
-                _write(entries[g], [_view_arrays(*one) for one in views[g]])
+                write_parts(entries[g], [_view_arrays(*one) for one in views[g]])
     return [
         [light_of_rows(view.through(way), sun, scenes.outside, suns.direction, suns.strength) for view, sun in views[g]]
         for g, way in beams
@@ -122,7 +120,7 @@ def open_beam_light(
     if stored is None:
         stored = trace()
         parts: list[Arrays] = [{"hours": one.hours, "light": one.light} for one in stored]
-        _write(entry, parts)
+        write_parts(entry, parts)
     return stored
 
 
@@ -144,7 +142,7 @@ def open_discs(scenes: SunScenes, inputs: tuple[object, ...], trace: Callable[[]
     stored = None if entry is None else entry.read(_discs_of)
     if stored is None:
         stored = trace()
-        _write(entry, [_disc_arrays(discs) for discs in stored])
+        write_parts(entry, [_disc_arrays(discs) for discs in stored])
     return stored
 
 
@@ -157,29 +155,12 @@ def open_sun(scenes: SunScenes, inputs: tuple[object, ...], trace: Callable[[], 
     stored = None if entry is None else entry.read(_open_sun_of)
     if stored is None:
         stored = trace()
-        _write(entry, [_open_sun_arrays(stored)])
+        write_parts(entry, [_open_sun_arrays(stored)])
     return stored
 
 
 def _sun_of(scenes: SunScenes, places: Sequence[SurfacePoints], suns: Suns) -> list[SunAtPoints]:
     return sun_at_points(scenes.outside, places, suns.direction)
-
-
-def _write(entry: CacheEntry | None, parts: Sequence[Arrays]) -> None:
-    """Write the arrays of each part, their names numbered."""
-    arrays = {f"{i} {name}": value for i, part in enumerate(parts) for name, value in part.items()}
-    if entry is not None and sum(value.nbytes for value in arrays.values()) <= MOST_STORED:
-        entry.write({"parts": np.int64(len(parts)), **arrays})
-
-
-def _parts(data: Arrays) -> list[dict[str, NDArray[Any]]]:
-    """The arrays of each part, as `_write` has them."""
-    found: list[dict[str, NDArray[Any]]] = [{} for _ in range(int(data["parts"]))]
-    for name in data:
-        number, _, field = name.partition(" ")
-        if field:
-            found[int(number)][field] = data[name]
-    return found
 
 
 def _point_arrays(places: SurfacePoints, sun: SunAtPoints) -> dict[str, NDArray[Any]]:
@@ -203,7 +184,7 @@ def _sun_in(part: Arrays) -> tuple[SurfacePoints, SunAtPoints]:
 
 def _windows_of(data: Arrays, count: int) -> list[tuple[SunShares, SunAtPoints]] | None:
     found = []
-    for part in _parts(data):
+    for part in parts_of(data):
         places, sun = _sun_in(part)
         shape = int(part["rows"]), places.size
         share = sparse.csr_array((part["data"], part["indices"], part["indptr"]), shape=shape)
@@ -213,7 +194,7 @@ def _windows_of(data: Arrays, count: int) -> list[tuple[SunShares, SunAtPoints]]
 
 def _views_of(data: Arrays, count: int) -> list[tuple[ViewShares, SunAtPoints]] | None:
     found = []
-    for part in _parts(data):
+    for part in parts_of(data):
         places, sun = _sun_in(part)
         entries = part["sensor"], part["place"], part["weight"], part["way"]
         found.append((ViewShares(places, int(part["sensors"]), *entries), sun))
@@ -221,7 +202,7 @@ def _views_of(data: Arrays, count: int) -> list[tuple[ViewShares, SunAtPoints]] 
 
 
 def _beams_of(data: Arrays) -> list[OpenBeamLight] | None:
-    return [OpenBeamLight(part["hours"], part["light"]) for part in _parts(data)] or None
+    return [OpenBeamLight(part["hours"], part["light"]) for part in parts_of(data)] or None
 
 
 def _disc_arrays(discs: SunDiscs) -> Arrays:
@@ -229,7 +210,7 @@ def _disc_arrays(discs: SunDiscs) -> Arrays:
 
 
 def _discs_of(data: Arrays) -> list[SunDiscs] | None:
-    parts = _parts(data)
+    parts = parts_of(data)
     return [SunDiscs(one["pair"], one["group"], one["light"], one["crossed"]) for one in parts] or None
 
 
@@ -247,7 +228,7 @@ def _open_sun_arrays(sun: OpenSun) -> Arrays:
 
 
 def _open_sun_of(data: Arrays) -> OpenSun | None:
-    (part,) = _parts(data)
+    (part,) = parts_of(data)
     edges = [
         DiscEdges(*(PackedArray.of_arrays(part, f"{name} {n}").whole() for name in ("edges", "edges towards")))
         for n in range(int(part["paths"]))
