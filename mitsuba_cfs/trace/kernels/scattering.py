@@ -119,7 +119,7 @@ class KlemsScattering:
 
         Args: exponent: of the fall of a specular system, see `PatchBeam`.
         """
-        self._bins = DirectionBins(basis)
+        self.bins = DirectionBins(basis)
         self._values = mi.Float(np.ascontiguousarray(scattered, dtype=np.float32).ravel())
         self._through = PatchBeam(basis, through, exponent)
         self.basis, self.beams = basis, np.asarray(through, dtype=float)  # [K] as the data have it
@@ -127,8 +127,8 @@ class KlemsScattering:
 
     def scattered(self, sun: mi.Vector3f, outward: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
-        row, column = self._bins.index(outward), self._bins.index(sun)
-        return dr.gather(mi.Float, self._values, row * self._bins.size + column)
+        row, column = self.bins.index(outward), self.bins.index(sun)
+        return dr.gather(mi.Float, self._values, row * self.bins.size + column)
 
     def through(self, sun: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
@@ -164,12 +164,12 @@ class SpecularScattering:
     def __init__(self, rest: Scattering, angular: AngularTable) -> None:
         """From the data's transmission and the exact angular function."""
         shares = angular.by_cosine()
-        self._rest, self._beam = rest, AngularBeam(shares)
+        self.rest, self._beam = rest, AngularBeam(shares)
         self.key: object = ("specular", rest.key, shares)
 
     def scattered(self, sun: mi.Vector3f, outward: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
-        return self._rest.scattered(sun, outward)
+        return self.rest.scattered(sun, outward)
 
     def through(self, sun: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
@@ -229,6 +229,18 @@ class TreeScattering(PluginScattering):
     def through(self, sun: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
         return self._beam.at(sun)
+
+
+def sun_patches(scattering: Scattering, suns: NDArray[np.float64]) -> NDArray[np.int64] | None:
+    """Numbers of local directions to the sun [Q, 3], the same where a system scatters their light the same way.
+
+    None for systems whose scattered light follows the sun's angle steadily, or in finer steps.
+    """
+    if isinstance(scattering, SpecularScattering):
+        return sun_patches(scattering.rest, suns)
+    if isinstance(scattering, KlemsScattering):
+        return scattering.bins.index(vectors(suns)).numpy().astype(np.int64)
+    return None
 
 
 def through_beams(

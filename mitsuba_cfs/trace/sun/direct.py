@@ -152,11 +152,11 @@ class _SunnySensors:
             if not discs.hidden:
                 tau = self._transmittance(scattering, suns), self._at_edges(scattering, edges)
                 discs.add_to(total, edges, *tau)
-        total = total.reshape(count, groups, self._sensors, len(self._suns))
+        by_sun = total.reshape(count, groups, self._sensors, len(self._suns))
         for g, system in enumerate(scattering):
             if system is not None and not sun.visible[g].empty:
-                self._add_scattered(total[:, g], g, system, sun, keys)
-        return total.astype(float) * SUN_SOLID_ANGLE
+                self._add_scattered(by_sun[:, g], g, system, sun, keys)
+        return by_sun.astype(float) * SUN_SOLID_ANGLE
 
     def _transmittance(self, scattering: Sequence[Scattering | None], suns: NDArray[np.float64]) -> NDArray[np.float32]:
         """Mean transmittance of the straight beams over the discs [G, Q]."""

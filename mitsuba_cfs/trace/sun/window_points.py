@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.matrices.packed import PackedArray
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, vectors
-from mitsuba_cfs.trace.kernels.scattering import Scattering
+from mitsuba_cfs.trace.kernels.scattering import Scattering, sun_patches
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.specular_paths import SpecularPath, on_disc
-from mitsuba_cfs.trace.sun.sun_discs import pairs
+from mitsuba_cfs.trace.sun.sun_discs import LANES, pairs
 
 
 @dataclass(frozen=True)
@@ -120,11 +120,43 @@ class SeenPoints:
         Args: suns: apparent directions [Q, 3]; sunlit: share of them that reaches the points [J, Q].
         """
         inside, group, batches = self.points.inside, self.points.group, self.points.batches
+        local = suns @ inside.groups[group].frame.T
+        patches = sun_patches(scattering, local)
+        if patches is not None:
+            return self._by_patches(scattering, local, patches, sunlit)
         towards, lit = vectors(suns), column(sunlit.ravel())
         points = self.weight, self.outward, self.points.size // batches
         light = _scattered(inside, group, scattering, points, lit, towards, (batches, self.sensors)).numpy()
         shape = batches, self.sensors, len(suns)
         return np.broadcast_to(light, math.prod(shape)).reshape(shape)
+
+    def _by_patches(
+        self,
+        scattering: Scattering,
+        local: NDArray[np.float64],
+        patches: NDArray[np.int64],
+        sunlit: NDArray[np.float32],
+    ) -> NDArray[np.float32]:
+        """The same for suns [Q, 3] in patches [Q], within which f does not change: a product of matrices for each."""
+        batches, each = self.points.batches, self.points.size // self.points.batches
+        lit = sunlit.reshape(batches, each, -1)
+        light = np.zeros((batches, self.sensors, len(local)), dtype=np.float32)
+        chosen, first = np.unique(patches, return_index=True)
+        pairs_of_patch = self.sensors * self.points.size
+        step = max(LANES // pairs_of_patch, 1)
+        for start in range(0, len(chosen), step):
+            some = first[start : start + step]
+            lane = dr.arange(mi.UInt32, len(some) * pairs_of_patch)
+            row = lane // dr.opaque(mi.UInt32, pairs_of_patch)
+            pair = lane - row * dr.opaque(mi.UInt32, pairs_of_patch)
+            sun = dr.gather(mi.Vector3f, vectors(local[some]), row)
+            f = scattering.scattered(sun, dr.gather(mi.Vector3f, self.outward, pair))
+            values = (f * dr.gather(mi.Float, self.weight, pair)).numpy()
+            by_patch = values.reshape(len(some), self.sensors, batches, each).swapaxes(1, 2)
+            for patch, weights in zip(chosen[start : start + step], by_patch, strict=True):
+                hours = np.flatnonzero(patches == patch)
+                light[:, :, hours] = weights @ lit[:, :, hours]
+        return light * np.maximum(local[:, 2], 0).astype(np.float32)
 
 
 @dr.syntax
