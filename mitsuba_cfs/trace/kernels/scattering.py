@@ -120,7 +120,8 @@ class KlemsScattering:
         Args: exponent: of the fall of a specular system, see `PatchBeam`.
         """
         self.bins = DirectionBins(basis)
-        self._values = mi.Float(np.ascontiguousarray(scattered, dtype=np.float32).ravel())
+        self.table = np.ascontiguousarray(scattered, dtype=np.float32)  # [K out, K in]
+        self._values = mi.Float(self.table.ravel())
         self._through = PatchBeam(basis, through, exponent)
         self.basis, self.beams = basis, np.asarray(through, dtype=float)  # [K] as the data have it
         self.key: object = ("klems", basis, np.asarray(scattered), np.asarray(through), exponent or -1.0)
@@ -231,16 +232,11 @@ class TreeScattering(PluginScattering):
         return self._beam.at(sun)
 
 
-def sun_patches(scattering: Scattering, suns: NDArray[np.float64]) -> NDArray[np.int64] | None:
-    """Numbers of local directions to the sun [Q, 3], the same where a system scatters their light the same way.
-
-    None for systems whose scattered light follows the sun's angle steadily, or in finer steps.
-    """
+def scattered_by_patches(scattering: Scattering) -> KlemsScattering | None:
+    """The Klems data that a system's scattered light follows; None for systems of another kind."""
     if isinstance(scattering, SpecularScattering):
-        return sun_patches(scattering.rest, suns)
-    if isinstance(scattering, KlemsScattering):
-        return scattering.bins.index(vectors(suns)).numpy().astype(np.int64)
-    return None
+        return scattered_by_patches(scattering.rest)
+    return scattering if isinstance(scattering, KlemsScattering) else None
 
 
 def through_beams(

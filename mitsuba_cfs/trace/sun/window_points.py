@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 
 from mitsuba_cfs.matrices.packed import PackedArray
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, vectors
-from mitsuba_cfs.trace.kernels.scattering import Scattering, sun_patches
+from mitsuba_cfs.trace.kernels.scattering import KlemsScattering, Scattering, scattered_by_patches
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.specular_paths import SpecularPath, on_disc
-from mitsuba_cfs.trace.sun.sun_discs import LANES, pairs
+from mitsuba_cfs.trace.sun.sun_discs import pairs
 
 
 @dataclass(frozen=True)
@@ -120,10 +120,9 @@ class SeenPoints:
         Args: suns: apparent directions [Q, 3]; sunlit: share of them that reaches the points [J, Q].
         """
         inside, group, batches = self.points.inside, self.points.group, self.points.batches
-        local = suns @ inside.groups[group].frame.T
-        patches = sun_patches(scattering, local)
-        if patches is not None:
-            return self._by_patches(scattering, local, patches, sunlit)
+        klems = scattered_by_patches(scattering)
+        if klems is not None:
+            return self._by_patches(klems, suns @ inside.groups[group].frame.T, sunlit)
         towards, lit = vectors(suns), column(sunlit.ravel())
         points = self.weight, self.outward, self.points.size // batches
         light = _scattered(inside, group, scattering, points, lit, towards, (batches, self.sensors)).numpy()
@@ -131,31 +130,25 @@ class SeenPoints:
         return np.broadcast_to(light, math.prod(shape)).reshape(shape)
 
     def _by_patches(
-        self,
-        scattering: Scattering,
-        local: NDArray[np.float64],
-        patches: NDArray[np.int64],
-        sunlit: NDArray[np.float32],
+        self, klems: KlemsScattering, local: NDArray[np.float64], sunlit: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """The same for suns [Q, 3] in patches [Q], within which f does not change: a product of matrices for each."""
+        """The same by a product of matrices for each patch of the sun, within which f does not change.
+
+        Args: local: directions to the suns in the group's frame [Q, 3].
+        """
         batches, each = self.points.batches, self.points.size // self.points.batches
+        shape = self.sensors, batches, each
+        weight, outward = self.weight.numpy().reshape(shape), klems.bins.index(self.outward).numpy().reshape(shape)
+        before = local[:, 2] > 0
+        patch = np.where(before, klems.bins.index(vectors(local)).numpy().astype(np.int64), -1)
         lit = sunlit.reshape(batches, each, -1)
         light = np.zeros((batches, self.sensors, len(local)), dtype=np.float32)
-        chosen, first = np.unique(patches, return_index=True)
-        pairs_of_patch = self.sensors * self.points.size
-        step = max(LANES // pairs_of_patch, 1)
-        for start in range(0, len(chosen), step):
-            some = first[start : start + step]
-            lane = dr.arange(mi.UInt32, len(some) * pairs_of_patch)
-            row = lane // dr.opaque(mi.UInt32, pairs_of_patch)
-            pair = lane - row * dr.opaque(mi.UInt32, pairs_of_patch)
-            sun = dr.gather(mi.Vector3f, vectors(local[some]), row)
-            f = scattering.scattered(sun, dr.gather(mi.Vector3f, self.outward, pair))
-            values = (f * dr.gather(mi.Float, self.weight, pair)).numpy()
-            by_patch = values.reshape(len(some), self.sensors, batches, each).swapaxes(1, 2)
-            for patch, weights in zip(chosen[start : start + step], by_patch, strict=True):
-                hours = np.flatnonzero(patches == patch)
-                light[:, :, hours] = weights @ lit[:, :, hours]
+        for k in np.unique(patch[before]):
+            values = klems.table[:, k]
+            if values.any():
+                hours = np.flatnonzero(patch == k)
+                of_patch = (weight * values[outward]).swapaxes(0, 1)
+                light[:, :, hours] = of_patch @ lit[:, :, hours]
         return light * np.maximum(local[:, 2], 0).astype(np.float32)
 
 
