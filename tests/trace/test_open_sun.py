@@ -215,3 +215,14 @@ def test_half_a_disc_has_the_transmittance_of_its_visible_half():
         )
         errors.append(found.values[0, 0] / SUN_SOLID_ANGLE / light.mean() - 1)
     assert np.abs(errors).max() < 0.005, errors
+
+
+def test_a_product_for_each_patch_of_the_sun_is_the_sum_over_all_points(monkeypatch):
+    from mitsuba_cfs.trace.sun import window_points
+
+    of_groups = systems()[0]
+    by_patches = matrix(of_groups, None).values
+    monkeypatch.setattr(window_points, "scattered_by_patches", lambda scattering: None)
+    by_points = matrix(of_groups, None).values
+    assert by_points.any(axis=(1, 2)).all()
+    np.testing.assert_allclose(by_patches, by_points, rtol=2e-5, atol=1e-7 * by_points.max())
