@@ -223,7 +223,8 @@ def straight_view_matrix(
     points, directions = sensors_of(points, directions)
     sky, S, n = SkyBins(ReinhartSky(subdivision)), len(points), paths.samples
     inputs = interior, exterior, groups, points, directions, subdivision
-    rays = _SensorRays(interior, exterior, groups, (points, directions), sky, paths, inputs)
+    inside, outside = (paths.scenes.scene(surfaces, groups) for surfaces in (interior, exterior))
+    rays = _SensorRays(inside, outside, (points, directions), sky, paths, inputs=inputs)
 
     def one_group(g: int, system: Scattering, number: int) -> NDArray[np.float64]:
         view = rays.to_sky(g, number)
@@ -247,16 +248,16 @@ class _SensorRays:
 
     def __init__(
         self,
-        interior: Surfaces,
-        exterior: Surfaces,
-        groups: Sequence[WindowGroup],
+        inside: TracedScene,
+        outside: TracedScene,
         sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
         sky: SkyBins,
         paths: PathOptions,
-        inputs: tuple[object, ...],
+        *,
+        inputs: tuple[object, ...],  # all else that they depend on
     ) -> None:
-        self._inside, self._outside = (paths.scenes.scene(surfaces, groups) for surfaces in (interior, exterior))
-        self._sensors, self._sky, self._paths, self._inputs = sensors, sky, paths, inputs
+        self._inside, self._outside, self._sensors, self._sky = inside, outside, sensors, sky
+        self._paths, self._inputs = paths, inputs
         self._stopping = paths.stopping or Stopping()
         self._ready: dict[tuple[int, int], OpenView] = {}  # by group and number of the batch
 

@@ -125,7 +125,7 @@ class SeenPoints:
             return self._by_patches(klems, suns @ inside.groups[group].frame.T, sunlit)
         towards, lit = vectors(suns), column(sunlit.ravel())
         points = self.weight, self.outward, self.points.size // batches
-        light = _scattered(inside, group, scattering, points, lit, towards, (batches, self.sensors)).numpy()
+        light = _scattered(inside, group, scattering, points, (lit, towards), (batches, self.sensors)).numpy()
         shape = batches, self.sensors, len(suns)
         return np.broadcast_to(light, math.prod(shape)).reshape(shape)
 
@@ -158,15 +158,15 @@ def _scattered(
     group: int,
     scattering: Scattering,
     points: tuple[mi.Float, mi.Vector3f, int],  # weights and directions [S * J], points of a batch
-    sunlit: mi.Float,  # [J * Q]
-    towards: mi.Vector3f,  # [Q]
+    suns: tuple[mi.Float, mi.Vector3f],  # share that reaches the points [J * Q], directions [Q]
     shape: tuple[int, int],  # batches, sensors
 ) -> mi.Float:
     """Sum over the points of f cos(sun) G, for each batch, sensor and sun [B * S * Q]."""
     weights, outwards, each = points
+    sunlit, towards = suns
     batches, sensors = shape
     count, every = dr.opaque(mi.UInt32, each), dr.opaque(mi.UInt32, batches * each)
-    suns = dr.opaque(mi.UInt32, dr.width(towards))
+    sun_count = dr.opaque(mi.UInt32, dr.width(towards))
     row, sun = pairs(batches * sensors, dr.width(towards))
     batch = row // dr.opaque(mi.UInt32, sensors)
     sensor = row - batch * dr.opaque(mi.UInt32, sensors)
@@ -175,7 +175,7 @@ def _scattered(
     j, end = batch * count, (batch + 1) * count
     total = mi.Float(0)
     while (j < end) & (local.z > 0):
-        lit = dr.gather(mi.Float, sunlit, j * suns + sun)
+        lit = dr.gather(mi.Float, sunlit, j * sun_count + sun)
         weight = lit * dr.gather(mi.Float, weights, sensor * every + j)
         if weight > 0:
             outward = dr.gather(mi.Vector3f, outwards, sensor * every + j)
