@@ -38,7 +38,7 @@ from mitsuba_cfs.methods.phase_matrices import as_five_phase, with_sensors
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.scattering import through_beams
-from mitsuba_cfs.trace.sun.direct import visible_suns
+from mitsuba_cfs.trace.sun.sun_discs import visible_suns
 
 SOURCE = 2000.0  # least luminance of a glare source [cd/m2]
 RIM = 0.05  # least cosine to the line of sight that a patch is divided by

@@ -29,7 +29,7 @@ from mitsuba_cfs.methods.subdivision import CellLight, Parts, allowed, subdivide
 from mitsuba_cfs.progress import Progress, part, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import SharedOutdoors, SurfaceGroups, Surfaces, WindowGroup
-from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, joined
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, cache_entry, joined
 from mitsuba_cfs.trace.kernels.patch_light import PatchLight
 from mitsuba_cfs.trace.kernels.path_options import PathOptions
 from mitsuba_cfs.trace.kernels.rooms import TracedRoom
@@ -518,13 +518,17 @@ def with_sunlit(matrices: PhaseMatrices) -> PhaseMatrices:
     """The matrices with the sunlit surfaces of the room that reflecting windows see."""
     if matrices.sunlit is not None:
         return matrices
-    interior, parts = matrices.scene.interior, matrices.parts.groups
-    sunlit = window_sunlit_shares(
-        matrices.scenes.scene(interior, parts),
-        samples=_exchange_paths(matrices, parts, EXCHANGE_SHARE, INDOOR_DEPTH).samples,
-        seed=matrices.sampling.seed,
+    interior, parts, seed = matrices.scene.interior, matrices.parts.groups, matrices.sampling.seed
+    samples = _exchange_paths(matrices, parts, EXCHANGE_SHARE, INDOOR_DEPTH).samples
+    entry = cache_entry(
+        matrices.cache, "windows sunlit", interior, parts, samples, seed, by=SunlitShares.__module__, stopping=None
     )
-    return replace(matrices, sunlit=sunlit)
+    sunlit = None if entry is None else entry.read(SunlitShares.of_arrays)
+    if sunlit is None:
+        sunlit = [window_sunlit_shares(matrices.scenes.scene(interior, parts), samples=samples, seed=seed)]
+        if entry is not None:
+            _write(entry, sunlit[0].arrays())
+    return replace(matrices, sunlit=sunlit[0])
 
 
 def few_pictures(matrices: PhaseMatrices, pictures: int) -> bool:

@@ -15,7 +15,7 @@ from mitsuba_cfs.methods.glare_map import glare_of_eyes, probability
 from mitsuba_cfs.methods.light import with_view
 from mitsuba_cfs.sky.epw import read_epw
 from mitsuba_cfs.sky.sun import SUN_RADIUS
-from mitsuba_cfs.trace.sun.direct import visible_suns
+from mitsuba_cfs.trace.sun.sun_discs import visible_suns
 from scenes.demo import WEATHER
 from scenes.fenestration.systems import FenestrationSystem
 from scenes.room.inputs import room_inputs, skies_for

@@ -136,3 +136,27 @@ def test_a_byte_for_each_point_and_sun_holds_their_irradiance():
     np.testing.assert_allclose(whole, irradiance, atol=2e-5)
     parts = [sun.light(places, suns, part) for part in (slice(0, 37), slice(37, 300), slice(300, 400))]
     np.testing.assert_array_equal(np.concatenate(parts, axis=1), whole)
+
+
+def test_the_sunlit_surfaces_that_windows_see_come_from_the_cache(tmp_path, monkeypatch):
+    """They belong to the room: windows that reflect with another system trace none of them."""
+    from mitsuba_cfs.methods import phase_matrices as phases
+    from mitsuba_cfs.methods.scene import Sampling
+
+    few = Sampling(sensor_samples=512, patch_samples=4096, subdivision=1)
+
+    def sunlit(cache: MatrixCache | None, **options):
+        matrices = phases.phase_matrices(scene(facade()), replace(few, **options), needs=(), cache=cache)
+        return phases.with_sunlit(matrices).sunlit
+
+    fresh, cache = sunlit(None), MatrixCache(tmp_path)
+    sunlit(cache)
+    other = sunlit(cache, seed=1)
+    monkeypatch.setattr(phases, "window_sunlit_shares", None)
+    stored = sunlit(cache)
+    assert fresh.share.nnz > 1000
+    assert (stored.share != fresh.share).nnz == 0 and (other.share != fresh.share).nnz > 0
+    rng = np.random.default_rng(2)
+    cells, near = (rng.random((n, 3), dtype=np.float32) for n in (fresh.cells.size, fresh.places.size))
+    np.testing.assert_array_equal(stored.rows(cells, near), fresh.rows(cells, near))
+    np.testing.assert_array_equal(stored.cells.keys, fresh.cells.keys)

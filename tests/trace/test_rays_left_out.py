@@ -24,7 +24,8 @@ def test_discs_that_no_window_can_show_are_those_of_all_pairs(monkeypatch):
     """Among them suns whose disc alone reaches the window, from sensors near and far."""
     from mitsuba_cfs.bsdf.klems import KLEMS_FULL
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
-    from mitsuba_cfs.trace.sun.direct import SunDiscs, direct_sun_matrix
+    from mitsuba_cfs.trace.sun import sun_discs
+    from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
 
     room, groups = rooms.test_room()
     sensors = np.array([[1.8, 0.05, 0.8], [1.8, 1.0, 0.8], [1.0, 4.0, 0.8], [1.8, 4.0, 1.7]])
@@ -40,7 +41,7 @@ def test_discs_that_no_window_can_show_are_those_of_all_pairs(monkeypatch):
 
     some = matrix()
     pairs = len(sensors) * len(suns)
-    monkeypatch.setattr(SunDiscs, "_before_windows", lambda self: np.ones(pairs, dtype=bool))
+    monkeypatch.setattr(sun_discs, "_before_windows", lambda around: np.ones(pairs, dtype=bool))
     np.testing.assert_array_equal(some, matrix())
     assert 0.02 < np.mean(some > 0) < 0.3
 

@@ -119,16 +119,17 @@ class KlemsScattering:
 
         Args: exponent: of the fall of a specular system, see `PatchBeam`.
         """
-        self._bins = DirectionBins(basis)
-        self._values = mi.Float(np.ascontiguousarray(scattered, dtype=np.float32).ravel())
+        self.bins = DirectionBins(basis)
+        self.table = np.ascontiguousarray(scattered, dtype=np.float32)  # [K out, K in]
+        self._values = mi.Float(self.table.ravel())
         self._through = PatchBeam(basis, through, exponent)
         self.basis, self.beams = basis, np.asarray(through, dtype=float)  # [K] as the data have it
         self.key: object = ("klems", basis, np.asarray(scattered), np.asarray(through), exponent or -1.0)
 
     def scattered(self, sun: mi.Vector3f, outward: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
-        row, column = self._bins.index(outward), self._bins.index(sun)
-        return dr.gather(mi.Float, self._values, row * self._bins.size + column)
+        row, column = self.bins.index(outward), self.bins.index(sun)
+        return dr.gather(mi.Float, self._values, row * self.bins.size + column)
 
     def through(self, sun: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
@@ -164,12 +165,12 @@ class SpecularScattering:
     def __init__(self, rest: Scattering, angular: AngularTable) -> None:
         """From the data's transmission and the exact angular function."""
         shares = angular.by_cosine()
-        self._rest, self._beam = rest, AngularBeam(shares)
+        self.rest, self._beam = rest, AngularBeam(shares)
         self.key: object = ("specular", rest.key, shares)
 
     def scattered(self, sun: mi.Vector3f, outward: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
-        return self._rest.scattered(sun, outward)
+        return self.rest.scattered(sun, outward)
 
     def through(self, sun: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
@@ -229,6 +230,13 @@ class TreeScattering(PluginScattering):
     def through(self, sun: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
         return self._beam.at(sun)
+
+
+def scattered_by_patches(scattering: Scattering) -> KlemsScattering | None:
+    """The Klems data that a system's scattered light follows; None for systems of another kind."""
+    if isinstance(scattering, SpecularScattering):
+        return scattered_by_patches(scattering.rest)
+    return scattering if isinstance(scattering, KlemsScattering) else None
 
 
 def through_beams(

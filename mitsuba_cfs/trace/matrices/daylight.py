@@ -211,6 +211,7 @@ def add_daylight_paths(
     matrix: mi.Float64,  # [rows * P], accumulated in place
     starts: PathStarts,  # on the window or the sensor, outdoors
     weight: mi.Float | None = None,  # of each path, 1 by default
+    patches: mi.UInt32 | None = None,  # [rows] to set to the patch met, with one path in each row of a `matrix` [rows]
 ) -> None:
     """Follow each path to the sky, where the patch it meets gains the product of reflectances.
 
@@ -229,6 +230,9 @@ def add_daylight_paths(
         hit = tracer.scene.ray_intersect_preliminary(ray, coherent=False, active=active)
         free = active & ~hit.is_valid()
         slot = row * mi.UInt32(sky.size) + sky.index(direction)
+        if dr.hint(patches is not None, mode="scalar"):
+            dr.scatter(patches, sky.index(direction), row, free)
+            slot = mi.UInt32(row)
         dr.scatter_add(matrix, mi.Float64(beta * weight), slot, free)
         active &= hit.is_valid()
         if active:

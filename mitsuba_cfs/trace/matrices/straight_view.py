@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.matrices.stored_parts import MOST_STORED, Arrays, parts_of, write_parts
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, even_numbers, points_on_triangles
@@ -28,6 +29,7 @@ from mitsuba_cfs.trace.kernels.path_options import PathOptions
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts, roulette
 from mitsuba_cfs.trace.kernels.sampling import (
     batch_key,
+    column,
     empty_sums,
     lattice_2d,
     opaque,
@@ -170,6 +172,31 @@ FAR = 0.5  # of the root of a group's area, from which all rays are drawn to its
 POINTS = 64  # of a window, for its distance
 
 
+@dataclass(frozen=True, slots=True)
+class OpenView:
+    """Rays of sensors straight through an open window group to the sky in one batch, axis r."""
+
+    ray: NDArray[np.uint32]  # [r] numbers: sensor * samples + sample
+    weight: NDArray[np.float32]  # [r] [sr, projected] times the reflectances outdoors
+    patch: NDArray[np.unsignedinteger]  # [r] of the sky
+
+    @classmethod
+    def of(cls, weight: NDArray[np.float64], patch: NDArray[np.uint32], most: int) -> OpenView:
+        """From the weights of all rays, 0 where one does not come to the sky, and their patches of so many."""
+        ray = np.flatnonzero(weight > 0)
+        smallest = np.min_scalar_type(most - 1)
+        return cls(ray.astype(np.uint32), weight[ray].astype(np.float32), patch[ray].astype(smallest))
+
+    @property
+    def nbytes(self) -> int:
+        """Memory."""
+        return self.ray.nbytes + self.weight.nbytes + self.patch.nbytes
+
+    def arrays(self) -> Arrays:
+        """The arrays of a file."""
+        return {"ray": self.ray, "weight": self.weight, "patch": self.patch}
+
+
 def straight_view_matrix(
     interior: Surfaces,
     exterior: Surfaces,
@@ -186,50 +213,136 @@ def straight_view_matrix(
         B[g, s, p] = integral over the visible part of g of cosine tau(omega) R(x, omega, p) d omega
 
     R is the radiance that arrives from outdoors along omega at x per unit of the patch, with all
-    reflections outdoors; the room reflects nothing.
+    reflections outdoors; the room reflects nothing.  Rays are traced through open windows and
+    cached for all systems, which add tau.
 
     Args:
         scattering: of each group's system; None leaves a group out.
         paths: from points on each group to each sensor; a depth of 1 for direct sky light only.
     """
     points, directions = sensors_of(points, directions)
-    inside, outside = (paths.scenes.scene(surfaces, groups) for surfaces in (interior, exterior))
     sky, S, n = SkyBins(ReinhartSky(subdivision)), len(points), paths.samples
+    inputs = interior, exterior, groups, points, directions, subdivision
+    inside, outside = (paths.scenes.scene(surfaces, groups) for surfaces in (interior, exterior))
+    rays = _SensorRays(inside, outside, (points, directions), sky, paths, inputs=inputs)
 
-    def one_group(g: int, way: Scattering, key: mi.UInt32) -> NDArray[np.float64]:
-        matrix = empty_sums(S * sky.size)
-        stream = key ^ opaque(0x510E527F + g, mi.UInt32)
-        sensor, start, omega, weight = straight_rays(inside, g, way, (points, directions), n, stream)
-        starts = PathStarts(
-            sensor,
-            start,
-            omega,
-            path_generator(dr.arange(mi.UInt32, S * n), key),
-            dr.opaque(mi.UInt32, paths.max_depth),
-            weight > 0,
-        )
-        add_daylight_paths(outside, sky, matrix, starts, weight)
-        return sums_of(matrix, (S, sky.size)) / n
+    def one_group(g: int, system: Scattering, number: int) -> NDArray[np.float64]:
+        view = rays.to_sky(g, number)
+        tau = np.broadcast_to(system.through(rays.local(g, number, view.ray)).numpy(), len(view.ray))
+        slot = (view.ray // np.uint32(n)).astype(np.int64) * sky.size + view.patch
+        light = np.bincount(slot, view.weight * tau.astype(float), S * sky.size)
+        return light.reshape(S, sky.size) / n
 
     def batch(number: int) -> NDArray[np.float64]:
-        key = batch_key(paths.seed, number)
         nothing = np.zeros((S, sky.size))
-        return np.stack([nothing if way is None else one_group(g, way, key) for g, way in enumerate(scattering)])
+        return np.stack(
+            [nothing if system is None else one_group(g, system, number) for g, system in enumerate(scattering)]
+        )
 
-    keys = [None if way is None else way.key for way in scattering]
-    inputs = interior, exterior, groups, keys, points, directions, subdivision
-    return paths.estimate("straight view", batch, *inputs, by=__name__)
+    keys = [None if system is None else system.key for system in scattering]
+    return paths.estimate("straight view", batch, *inputs, keys, by=__name__)
+
+
+class _SensorRays:
+    """Rays of sensors straight through open window groups to the sky, from the cache or traced."""
+
+    def __init__(
+        self,
+        inside: TracedScene,
+        outside: TracedScene,
+        sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
+        sky: SkyBins,
+        paths: PathOptions,
+        *,
+        inputs: tuple[object, ...],  # all else that they depend on
+    ) -> None:
+        self._inside, self._outside, self._sensors, self._sky = inside, outside, sensors, sky
+        self._paths, self._inputs = paths, inputs
+        self._stopping = paths.stopping or Stopping()
+        self._ready: dict[tuple[int, int], OpenView] = {}  # by group and number of the batch
+
+    def to_sky(self, group: int, number: int) -> OpenView:
+        """The rays of a group in a batch that come to the sky."""
+        if (group, number) not in self._ready:
+            count = self._stopping.ahead(number)
+            entry = self._paths.entry("open view", *self._inputs, group, number, count, by=__name__)
+            views = None if entry is None else entry.read(_views_of)
+            if views is None:
+                views = self._traced(group, number, count)
+                write_parts(entry, [view.arrays() for view in views])
+            self._ready.update({(group, number + i): view for i, view in enumerate(views)})
+        return self._ready.pop((group, number))
+
+    def local(self, group: int, number: int, rays: NDArray[np.uint32]) -> mi.Vector3f:
+        """Directions of rays of a batch [r, 3] in the group's frame."""
+        inside, key = self._inside, _stream(batch_key(self._paths.seed, number), group)
+        ray = column(rays, mi.UInt32)
+        return inside.to_group(group, _Aims(inside, group, ray, self._sensors, self._paths.samples, key).omega)
+
+    def _traced(self, group: int, first: int, count: int) -> list[OpenView]:
+        """Rays of so many batches, or of some where these are as much as a file may hold."""
+        views: list[OpenView] = []
+        while len(views) < count and sum(view.nbytes for view in views) <= MOST_STORED:
+            views.append(self._trace(group, batch_key(self._paths.seed, first + len(views))))
+        return views
+
+    def _trace(self, group: int, key: mi.UInt32) -> OpenView:
+        rays = len(self._sensors[0]) * self._paths.samples
+        light, patches = empty_sums(rays), dr.zeros(mi.UInt32, rays)
+        stream = _stream(key, group)
+        _, start, omega, weight = straight_rays(self._inside, group, self._sensors, self._paths.samples, stream)
+        ray = dr.arange(mi.UInt32, rays)
+        depth = dr.opaque(mi.UInt32, self._paths.max_depth)
+        starts = PathStarts(ray, start, omega, path_generator(ray, key), depth, weight > 0)
+        add_daylight_paths(self._outside, self._sky, light, starts, weight, patches)
+        dr.eval(light, patches)
+        return OpenView.of(sums_of(light, (rays,)), patches.numpy(), self._sky.size)
+
+
+def _views_of(data: Arrays) -> list[OpenView] | None:
+    return [OpenView(one["ray"], one["weight"], one["patch"]) for one in parts_of(data)] or None
+
+
+def _stream(key: mi.UInt32, group: int) -> mi.UInt32:
+    """Key of the random numbers of a group in a batch."""
+    return key ^ opaque(0x510E527F + group, mi.UInt32)
+
+
+class _Aims:
+    """Where rays of sensors [r] to a window group are sent, before anything is traced."""
+
+    def __init__(
+        self,
+        inside: TracedScene,
+        group: int,
+        ray: mi.UInt32,  # [r] numbers: sensor * samples + sample
+        sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
+        samples: int,
+        key: mi.UInt32,
+    ) -> None:
+        place, normal = (np.atleast_2d(v) for v in sensors)
+        count = dr.opaque(mi.UInt32, samples)
+        self.sensor = ray // count
+        number = ray - self.sensor * count
+        u = lattice_2d(number, mi.sample_tea_32(self.sensor, key)[0], 0)
+        self.start = dr.gather(mi.Point3f, vectors(place - inside.centre, mi.Point3f), self.sensor)
+        self.away = dr.gather(mi.Vector3f, vectors(normal), self.sensor)
+        by_area = mi.Float(hemisphere_shares(inside.groups[group], place).astype(np.float32))
+        self.share = dr.gather(mi.Float, by_area, self.sensor)
+        self.by_cosine = mi.Float(number) < self.share * mi.Float(count)
+        self.to_target = inside.sample_group(group, u) - self.start
+        turned = mi.Frame3f(self.away).to_world(mi.warp.square_to_cosine_hemisphere(u))
+        self.omega = mi.Vector3f(dr.select(self.by_cosine, turned, dr.normalize(self.to_target)))
 
 
 def straight_rays(
     inside: TracedScene,
     group: int,
-    way: Scattering,
     sensors: tuple[NDArray[np.float64], NDArray[np.float64]],
     samples: int,
     key: mi.UInt32,
 ) -> tuple[mi.UInt32, mi.Point3f, mi.Vector3f, mi.Float]:
-    """Rays of sensors [S * samples] straight through a window group.
+    """Rays of sensors [S * samples] straight through an open window group.
 
     Some are drawn to points of the group's area, others by the sensor's cosine: the former alone
     are as noisy as the inverse square of the distance near the glass (balance heuristic of Veach,
@@ -240,36 +353,22 @@ def straight_rays(
     Returns: sensor, start just outdoors, direction; the weight [sr, projected] of a
     ray times the samples, 0 where the sensor does not see the window.
     """
-    place, normal = (np.atleast_2d(v) for v in sensors)
-    count = dr.opaque(mi.UInt32, samples)
-    lane = dr.arange(mi.UInt32, len(place) * samples)
-    sensor = lane // count
-    stream = mi.sample_tea_32(sensor, key)[0]
-    number = lane - sensor * count
-    u = lattice_2d(number, stream, 0)
-    start = dr.gather(mi.Point3f, vectors(place - inside.centre, mi.Point3f), sensor)
-    away = dr.gather(mi.Vector3f, vectors(normal), sensor)
-    by_area = mi.Float(hemisphere_shares(inside.groups[group], place).astype(np.float32))
-    share = dr.gather(mi.Float, by_area, sensor)
-    by_cosine = mi.Float(number) < share * mi.Float(count)
-    to_target = inside.sample_group(group, u) - start
-    turned = mi.Frame3f(away).to_world(mi.warp.square_to_cosine_hemisphere(u))
-    omega = mi.Vector3f(dr.select(by_cosine, turned, dr.normalize(to_target)))
-    reach = dr.select(by_cosine, dr.largest(mi.Float), dr.norm(to_target) * (1 - 1e-4))
-    ray = mi.Ray3f(start, omega, reach, 0.0, [])
-    hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=True)
+    ray = dr.arange(mi.UInt32, len(np.atleast_2d(sensors[0])) * samples)
+    aims = _Aims(inside, group, ray, sensors, samples, key)
+    start, omega, by_cosine, share = aims.start, aims.omega, aims.by_cosine, aims.share
+    reach = dr.select(by_cosine, dr.largest(mi.Float), dr.norm(aims.to_target) * (1 - 1e-4))
+    hit = inside.scene.ray_intersect_preliminary(mi.Ray3f(start, omega, reach, 0.0, []), coherent=False, active=True)
     is_window = dr.gather(mi.Int32, inside.group, hit.prim_index, hit.is_valid()) == opaque(group, mi.Int32)
-    distance = dr.select(by_cosine, hit.t, dr.norm(to_target))
+    distance = dr.select(by_cosine, hit.t, dr.norm(aims.to_target))
     local = inside.to_group(group, omega)
-    cosine = dr.dot(away, omega)
+    cosine = dr.dot(aims.away, omega)
     seen = (cosine > 0) & (local.z > 1e-4)
     seen &= dr.select(by_cosine, hit.is_valid() & is_window, ~hit.is_valid())
     area = opaque(inside.groups[group].area)
     density = (1 - share) * dr.square(distance) / (area * local.z) + share * cosine * dr.inv_pi
-    weight = cosine * way.through(local) / density
     target = start + omega * dr.select(seen, distance, 0)
     beyond = mi.Point3f(target + inside.outward(opaque(group, mi.Int32), mi.Bool(True)))
-    return sensor, beyond, omega, dr.select(seen, weight, 0.0)
+    return aims.sensor, beyond, omega, dr.select(seen, cosine / density, 0.0)
 
 
 def hemisphere_shares(group: WindowGroup, places: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -3,9 +3,12 @@
     light of a row  = sum over points m of share[row, m] E_sun[m]                 outdoors to the windows
     light of sensor = sum over paths i of w[i] tau(way[i]) E_sun[m(i)]            outdoors, straight through
                     = sum over specular paths n of tau_n(sun) E_n[s] E_normal     beam reflected by the room
+                    = sum over specular paths n of tau_n(sun) O_n[s] E_normal     beam of the sun's disc
+                    + sum over points j of w[s, j] l_n[j] f(sun, s) E_normal      light that windows scatter
 
-Points, weights, E_sun and E_n are geometry: they are traced with open windows and stored.  A system adds
-tau, the transmittance of its straight beam, so that another system traces none of these rays again.
+Points, weights, E_sun, E_n, O_n and the sunlit share l_n are geometry: they are traced with open windows and
+stored.  A system adds tau, the transmittance of its straight beam, and its BSDF f, so that another system
+traces none of these rays again.
 """
 
 from __future__ import annotations
@@ -19,16 +22,16 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from mitsuba_cfs.matrices.cache import CacheEntry, MatrixCache
+from mitsuba_cfs.matrices.packed import PackedArray
+from mitsuba_cfs.matrices.stored_parts import Arrays, parts_of, write_parts
 from mitsuba_cfs.trace.kernels.estimate import cache_entry
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints
 from mitsuba_cfs.trace.sun.reflected import SunShares, ViewShares, light_of_rows, view_shares, window_shares
 from mitsuba_cfs.trace.sun.sun_at_points import SunAtPoints, sun_at_points
+from mitsuba_cfs.trace.sun.sun_discs import DiscEdges, SunDiscs
 from mitsuba_cfs.trace.sun.sunlit_sensors import OpenBeamLight
-
-MOST_STORED = 1 << 25  # bytes of an entry: larger ones are traced again
-Arrays = Mapping[str, NDArray[Any]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +66,7 @@ def sunlit_windows(
         shares = window_shares(scenes.outside, samples=samples, places=places, seeds=seeds)
         stored = list(zip(shares, _sun_of(scenes, [one.places for one in shares], suns), strict=True))
         if all(one.rough is None for one in shares):
-            _write(entry, [_window_arrays(*one) for one in stored])
+            write_parts(entry, [_window_arrays(*one) for one in stored])
     return [light_of_rows(*one, scenes.outside, suns.direction, suns.strength) for one in stored]
 
 
@@ -98,7 +101,7 @@ def seen_through(
         for i, g in enumerate(missing):
             views[g] = whole[i * len(seeds) : (i + 1) * len(seeds)]
             if all(one.rough is None for one, _ in views[g]):
-                _write(entries[g], [_view_arrays(*one) for one in views[g]])
+                write_parts(entries[g], [_view_arrays(*one) for one in views[g]])
     return [
         [light_of_rows(view.through(way), sun, scenes.outside, suns.direction, suns.strength) for view, sun in views[g]]
         for g, way in beams
@@ -117,29 +120,47 @@ def open_beam_light(
     if stored is None:
         stored = trace()
         parts: list[Arrays] = [{"hours": one.hours, "light": one.light} for one in stored]
-        _write(entry, parts)
+        write_parts(entry, parts)
+    return stored
+
+
+@dataclass(frozen=True, slots=True)
+class OpenSun:
+    """The direct sun of sensors through open windows in some batches B."""
+
+    edges: Sequence[DiscEdges]  # discs that an edge crosses, by specular path [N]
+    visible: Mapping[int, PackedArray]  # [S, J] whether sensors see the points on a group
+    sunlit: Mapping[tuple[int, int], PackedArray]  # [J, Q] share of the suns there, by path and group; none: 0
+
+
+def open_discs(scenes: SunScenes, inputs: tuple[object, ...], trace: Callable[[], list[SunDiscs]]) -> list[SunDiscs]:
+    """The sun's disc at sensors through open windows by specular path [N], cached or as `trace` has it.
+
+    Args: inputs: that it depends on beside the scenes.
+    """
+    entry = scenes.entry("sun discs", *inputs)
+    stored = None if entry is None else entry.read(_discs_of)
+    if stored is None:
+        stored = trace()
+        write_parts(entry, [_disc_arrays(discs) for discs in stored])
+    return stored
+
+
+def open_sun(scenes: SunScenes, inputs: tuple[object, ...], trace: Callable[[], OpenSun]) -> OpenSun:
+    """The direct sun of sensors through open windows in some batches, cached or as `trace` has it.
+
+    Args: inputs: as of `open_discs`, and the batches.
+    """
+    entry = scenes.entry("sun on windows", *inputs)
+    stored = None if entry is None else entry.read(_open_sun_of)
+    if stored is None:
+        stored = trace()
+        write_parts(entry, [_open_sun_arrays(stored)])
     return stored
 
 
 def _sun_of(scenes: SunScenes, places: Sequence[SurfacePoints], suns: Suns) -> list[SunAtPoints]:
     return sun_at_points(scenes.outside, places, suns.direction)
-
-
-def _write(entry: CacheEntry | None, parts: Sequence[Arrays]) -> None:
-    """Write the arrays of each part, their names numbered."""
-    arrays = {f"{i} {name}": value for i, part in enumerate(parts) for name, value in part.items()}
-    if entry is not None and sum(value.nbytes for value in arrays.values()) <= MOST_STORED:
-        entry.write({"parts": np.int64(len(parts)), **arrays})
-
-
-def _parts(data: Arrays) -> list[dict[str, NDArray[Any]]]:
-    """The arrays of each part, as `_write` has them."""
-    found: list[dict[str, NDArray[Any]]] = [{} for _ in range(int(data["parts"]))]
-    for name in data:
-        number, _, field = name.partition(" ")
-        if field:
-            found[int(number)][field] = data[name]
-    return found
 
 
 def _point_arrays(places: SurfacePoints, sun: SunAtPoints) -> dict[str, NDArray[Any]]:
@@ -163,7 +184,7 @@ def _sun_in(part: Arrays) -> tuple[SurfacePoints, SunAtPoints]:
 
 def _windows_of(data: Arrays, count: int) -> list[tuple[SunShares, SunAtPoints]] | None:
     found = []
-    for part in _parts(data):
+    for part in parts_of(data):
         places, sun = _sun_in(part)
         shape = int(part["rows"]), places.size
         share = sparse.csr_array((part["data"], part["indices"], part["indptr"]), shape=shape)
@@ -173,7 +194,7 @@ def _windows_of(data: Arrays, count: int) -> list[tuple[SunShares, SunAtPoints]]
 
 def _views_of(data: Arrays, count: int) -> list[tuple[ViewShares, SunAtPoints]] | None:
     found = []
-    for part in _parts(data):
+    for part in parts_of(data):
         places, sun = _sun_in(part)
         entries = part["sensor"], part["place"], part["weight"], part["way"]
         found.append((ViewShares(places, int(part["sensors"]), *entries), sun))
@@ -181,4 +202,42 @@ def _views_of(data: Arrays, count: int) -> list[tuple[ViewShares, SunAtPoints]] 
 
 
 def _beams_of(data: Arrays) -> list[OpenBeamLight] | None:
-    return [OpenBeamLight(part["hours"], part["light"]) for part in _parts(data)] or None
+    return [OpenBeamLight(part["hours"], part["light"]) for part in parts_of(data)] or None
+
+
+def _disc_arrays(discs: SunDiscs) -> Arrays:
+    return {"pair": discs.pair, "group": discs.group, "light": discs.light, "crossed": discs.crossed}
+
+
+def _discs_of(data: Arrays) -> list[SunDiscs] | None:
+    parts = parts_of(data)
+    return [SunDiscs(one["pair"], one["group"], one["light"], one["crossed"]) for one in parts] or None
+
+
+def _open_sun_arrays(sun: OpenSun) -> Arrays:
+    """Groups and paths are numbered in the names; paths without sun have none."""
+    arrays: dict[str, NDArray[Any]] = {"paths": np.array(len(sun.edges)), "groups": np.array(sorted(sun.visible))}
+    for n, edges in enumerate(sun.edges):
+        arrays |= PackedArray.of(edges.light).arrays(f"edges {n}")
+        arrays |= PackedArray.of(edges.towards).arrays(f"edges towards {n}")
+    for g, visible in sun.visible.items():
+        arrays |= visible.arrays(f"visible {g}")
+    for (n, g), sunlit in sun.sunlit.items():
+        arrays |= sunlit.arrays(f"sunlit {n} {g}")
+    return arrays
+
+
+def _open_sun_of(data: Arrays) -> OpenSun | None:
+    (part,) = parts_of(data)
+    edges = [
+        DiscEdges(*(PackedArray.of_arrays(part, f"{name} {n}").whole() for name in ("edges", "edges towards")))
+        for n in range(int(part["paths"]))
+    ]
+    groups = [int(g) for g in part["groups"]]
+    sunlit = {
+        (n, g): PackedArray.of_arrays(part, f"sunlit {n} {g}")
+        for n in range(len(edges))
+        for g in groups
+        if f"sunlit {n} {g} shape" in part
+    }
+    return OpenSun(edges, {g: PackedArray.of_arrays(part, f"visible {g}") for g in groups}, sunlit)

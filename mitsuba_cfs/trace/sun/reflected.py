@@ -26,7 +26,7 @@ from scipy import sparse
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.trace.kernels.bins import DirectionBins
 from mitsuba_cfs.trace.kernels.sampling import batch_key, column, lattice_2d, opaque, tables, vectors
-from mitsuba_cfs.trace.kernels.scattering import OpenWindow, Scattering
+from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.matrices.straight_view import straight_rays
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_points, reflecting_points
@@ -162,7 +162,7 @@ def view_shares(
 
     def begun(group: int, seed: int) -> _Met:
         key = dr.opaque(mi.UInt32, seed & 0xFFFFFFFF)
-        _, target, omega, weight = straight_rays(inside, group, OpenWindow(), sensors, samples, key)
+        _, target, omega, weight = straight_rays(inside, group, sensors, samples, key)
         local = inside.to_group(group, omega)
         dr.eval(target, omega, weight, local)
         ways.append(np.ascontiguousarray(local.numpy().T, dtype=np.float32))

@@ -177,10 +177,11 @@ def beam_transmittance(scattering: Scattering, towards: NDArray[np.float64]) -> 
     outdoors = np.flatnonzero(towards[:, 2] > -SPREAD)
     if not len(outdoors):
         return found
-    number = (np.arange(DISC_POINTS) + 0.5) / DISC_POINTS
-    u = mi.Point2f(
-        column(np.tile(number, len(outdoors))), column(np.tile(np.arange(DISC_POINTS) * TURN % 1.0, len(outdoors)))
-    )
+    # in opposite pairs: what rises to one side of the disc falls to the other
+    pairs = np.arange(DISC_POINTS // 2)
+    share = np.tile((pairs + 0.5) / len(pairs), 2)
+    turn = np.concatenate([pairs * TURN, pairs * TURN + 0.5]) % 1.0
+    u = mi.Point2f(column(np.tile(share, len(outdoors))), column(np.tile(turn, len(outdoors))))
     way = disc_direction(vectors(np.repeat(towards[outdoors], DISC_POINTS, axis=0)), u)
     tau = dr.select(way.z > 0, scattering.through(way), 0.0).numpy()
     found[outdoors] = np.broadcast_to(tau, len(outdoors) * DISC_POINTS).reshape(-1, DISC_POINTS).mean(axis=1)

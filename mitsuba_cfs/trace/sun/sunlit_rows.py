@@ -92,6 +92,40 @@ class SunlitShares:
         share, near = (sparse.csr_array(rows @ part) for part in (self.share, self.near))
         return SunlitShares(self.cells, share, smooth, near, self.places, self.edges)
 
+    def arrays(self, number: int = 0) -> dict[str, NDArray[Any]]:
+        """The shares as the arrays of a file, `number`: among those of the same cells and pieces."""
+        cells = self.cells
+        arrays = {
+            "cell_edge": np.array(cells.edge),
+            "cell_low": cells.low,
+            "cell_halvings": np.array(cells.halvings),
+            "cell_keys": cells.keys,
+            "cell_area": cells.area,
+        }
+        matrices = {f"far{number}": self.share, f"near{number}": self.near}
+        for name, matrix in ({"smooth": self.smooth, "beside": self.edges.beside} | matrices).items():
+            arrays |= sparse_arrays(name, matrix)
+        for name, places in (("places", self.places), ("more", self.edges.places)):
+            arrays |= {f"{name}_point": places.point, f"{name}_normal": places.normal}
+        return arrays
+
+    @classmethod
+    def of_arrays(cls, data: Mapping[str, NDArray[Any]], count: int = 1) -> list[SunlitShares]:
+        """So many shares of the same cells and pieces, from the arrays of a file.
+
+        Raises: `KeyError` where one is missing.
+        """
+        cells = RoomCells(
+            float(data["cell_edge"]), data["cell_low"], int(data["cell_halvings"]), data["cell_keys"], data["cell_area"]
+        )
+        places = SurfacePoints(data["places_point"], data["places_normal"])
+        more = SurfacePoints(data["more_point"], data["more_normal"])
+        smooth, edges = (sparse_matrix(data, "smooth"), EdgePoints(more, sparse_matrix(data, "beside")))
+        return [
+            cls(cells, sparse_matrix(data, f"far{i}"), smooth, sparse_matrix(data, f"near{i}"), places, edges)
+            for i in range(count)
+        ]
+
 
 @dataclass(frozen=True, slots=True)
 class SunlitRows:
@@ -103,23 +137,7 @@ class SunlitRows:
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """The shares as the arrays of a file."""
-        first, cells = self.mean, self.mean.cells
-        arrays = {
-            "close": self.close,
-            "cell_edge": np.array(cells.edge),
-            "cell_low": cells.low,
-            "cell_halvings": np.array(cells.halvings),
-            "cell_keys": cells.keys,
-            "cell_area": cells.area,
-        }
-        matrices = {"smooth": first.smooth, "beside": first.edges.beside}
-        for i, rows in enumerate((first, self.noise)):
-            matrices |= {f"far{i}": rows.share, f"near{i}": rows.near}
-        for name, matrix in matrices.items():
-            arrays |= sparse_arrays(name, matrix)
-        for name, places in (("places", first.places), ("more", first.edges.places)):
-            arrays |= {f"{name}_point": places.point, f"{name}_normal": places.normal}
-        return arrays
+        return {"close": self.close} | self.mean.arrays(0) | self.noise.arrays(1)
 
     @classmethod
     def of_arrays(cls, data: Mapping[str, NDArray[Any]]) -> SunlitRows:
@@ -127,17 +145,7 @@ class SunlitRows:
 
         Raises: `KeyError` where one is missing.
         """
-        cells = RoomCells(
-            float(data["cell_edge"]), data["cell_low"], int(data["cell_halvings"]), data["cell_keys"], data["cell_area"]
-        )
-        places = SurfacePoints(data["places_point"], data["places_normal"])
-        more = SurfacePoints(data["more_point"], data["more_normal"])
-        smooth, edges = (sparse_matrix(data, "smooth"), EdgePoints(more, sparse_matrix(data, "beside")))
-        mean, noise = (
-            SunlitShares(cells, sparse_matrix(data, f"far{i}"), smooth, sparse_matrix(data, f"near{i}"), places, edges)
-            for i in range(2)
-        )
-        return cls(mean, noise, data["close"])
+        return cls(*SunlitShares.of_arrays(data, 2), data["close"])
 
 
 def sparse_arrays(name: str, matrix: sparse.csr_array) -> dict[str, NDArray[Any]]:
