@@ -103,7 +103,7 @@ def test_certainty_compares_the_difference_with_the_error(searched):
     assert sentences[0].startswith("Second is ")
     # a tenth of a metre is 0.4 / 12 kWh/m2, the noise of two seeds some 1e-4
     (sure,) = [one for one in sentences if "more than twice its standard error" in one]
-    assert sure.startswith("In energy demand they differ by 0.31 ")  # two digits, as its error has
+    assert sure.startswith("In energy demand they differ by 0.033 ")  # two digits, as its error has
 
 
 def test_two_that_are_equal_within_the_errors_are_named_so(tmp_path):
