@@ -19,7 +19,6 @@ PLAIN = {  # json.dumps that write no results
     "bim/building_file.py",  # an entry of the cache, which may hold NaN
     "bim/ifc/corrections_draft.py",
     "bim/ifc/correct.py",  # values of TOML
-    "scenes/room/operation.py",  # likewise
     "scenes/commands/self_test.py",
     "scenes/cost/reference.py",
     "scenes/calibration/shipped.py",

@@ -73,6 +73,7 @@ EXAMPLES = {
         "cfs bsdf generate --shape perforated --openness 0.1 --out sheet.xml",
         "cfs bsdf generate --depth-mm 80 --spacing-mm 72 --sheet-colour '#b04a3a' --out red.xml",
     ),
+    "bsdf system": ("cfs bsdf system layers.toml --out blind.xml",),
     "bsdf library": (
         "cfs bsdf library",
         "cfs bsdf library --glazing 'triple low-e' --shade 'screen 5 %, grey' --out screen.xml",

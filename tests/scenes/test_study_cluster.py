@@ -183,6 +183,7 @@ def test_who_stops_early_waits_for_nothing_and_leaves_no_work_behind(cluster, tm
     wanted, log = cases(tmp_path, [0, *(10 * i for i in range(9, 20))])
     with closing(computed(wanted, held_up, scheduler=cluster.address)) as results:
         next(results)
+        until(lambda: "held" in log.read_text(), 20)  # a worker has a case in hand
     assert log.read_text().count("begin") == 1  # the others are held up still
     Path(f"{log}.go").touch()
     until(lambda: log.read_text().count("end") > 1, 20)  # what a worker had in hand
