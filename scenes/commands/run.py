@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -188,7 +189,8 @@ def run_to_folder(
 
     if options.quick:
         click.echo(quick_run.NOTE)
-    lines, head, plan = _RoomLines(), PrintedHead(), _FirstPlan(folder, page_options.language)
+    head, plan = PrintedHead(), _FirstPlan(folder, page_options.language)
+    lines = _RoomLines(plan)
     with ProgressBar() as progress, compiled_beside():
         result = run_job(
             options,
@@ -230,37 +232,61 @@ def run_to_folder(
 
 
 class _FirstPlan:
-    """Prints the first plan and writes it in the place of the report."""
+    """Prints the first plan and writes it in the place of the report, with the light of rooms as they come."""
 
     def __init__(self, folder: ResultFolder, language: str) -> None:
         self._folder, self._language, self.table = folder, language, ""
+        self._rooms: dict[str, PlannedRoom] = {}  # by GUID
+        self._written = 0.0
 
     def __call__(self, rooms: Sequence[PlannedRoom]) -> None:
-        from scenes.language.catalogue import in_language
-        from scenes.result_folder import FIRST_PLAN, REPORT
-        from scenes.run.first_plan import plan_lines, plan_page, plan_table
+        from scenes.run.first_plan import plan_lines, plan_table
 
         self.table = plan_table(rooms)
-        with in_language(self._language):
-            self._folder.early({FIRST_PLAN: self.table, REPORT: plan_page(rooms)})
+        self._rooms = {room.space.guid: room for room in rooms}
+        self._write()
         click.echo("\n".join(plan_lines(rooms)))
+
+    def light(self, room) -> None:
+        """Put the light of a room in the place of the first; the page is written every few seconds."""
+        from scenes.run.first_plan import REFRESH_S
+
+        planned = self._rooms.get(room.space.guid)
+        if planned is None:
+            return
+        self._rooms[room.space.guid] = planned.completed(room.daylight)
+        if time.monotonic() - self._written >= REFRESH_S:
+            self._write()
+
+    def _write(self) -> None:
+        from scenes.language.catalogue import in_language
+        from scenes.result_folder import FIRST_PLAN, REPORT
+        from scenes.run.first_plan import plan_page
+
+        with in_language(self._language):
+            self._folder.early({FIRST_PLAN: self.table, REPORT: plan_page(list(self._rooms.values()))})
+        self._written = time.monotonic()
 
 
 class _RoomLines:
     """The headline figures of each room as it comes: of its light first where heat comes later."""
 
-    def __init__(self) -> None:
+    def __init__(self, plan: _FirstPlan) -> None:
         self._lit: set[str] = set()
+        self._plan = plan
 
     def light(self, room) -> None:
         """Print those of a room's light."""
         self._lit.add(room.space.guid)
+        self._plan.light(room)
         click.echo(f"{room.space.label}: {_light_figures(room)}")
         _print_grids(room)
 
     def year(self, room) -> None:
         """Print those of its heat, and of its light where that was not said."""
         light_printed = room.space.guid in self._lit
+        if not light_printed:
+            self._plan.light(room)
         click.echo(f"{room.space.label}: {_heat_figures(room)}" if light_printed else summary_line(room))
         if not light_printed:
             _print_grids(room)

@@ -34,6 +34,7 @@ from mitsuba_cfs.progress import Progress, silent
 from scenes.inputs import Inputs
 from scenes.language.catalogue import gettext
 from scenes.report.names import quantity
+from scenes.results import DaylightResult
 from scenes.room.daylight import room_daylight
 from scenes.room.inputs import RoomInputs, skies_for
 from scenes.room.light import RoomLight
@@ -63,6 +64,19 @@ class PlannedRoom:
     errors: dict[str, float]
     mean_error: float  # relative, of the yearly mean illuminance: the mean of the sensors
     unshaded: bool = False  # in the first shading state: its rules need more than a first plan has
+    complete: bool = False  # of the run itself, but for the hours with glare
+
+    def completed(self, daylight: DaylightResult) -> PlannedRoom:
+        """The room with the light of the run in place of the first; hours with glare stay as planned."""
+        figures, errors = _light_figures(daylight)
+        return replace(
+            self,
+            figures=self.figures | figures,
+            errors=self.errors | errors,
+            mean_error=float(daylight.relative_error.mean()),
+            unshaded=False,
+            complete=True,
+        )
 
 
 OnPlan = Callable[[Sequence[PlannedRoom]], None]  # called with the first plan of many rooms
@@ -120,18 +134,20 @@ def _planned(room: RoomInputs, matrices: PhaseMatrices) -> PlannedRoom:
     if not unshaded:
         state = shading_states(room, of_room, None)
     daylight = room_daylight(room, of_room, state, sunny_hours=False)
+    figures, errors = _light_figures(daylight)
+    figures["glare_h"], errors["glare_h"] = _glare_hours(room, of_room, state)
+    return PlannedRoom(room.space, figures, errors, float(daylight.relative_error.mean()), unshaded)
+
+
+def _light_figures(daylight: DaylightResult) -> tuple[dict[str, float], dict[str, float]]:
+    """Figures of a room's light by the first three `COLUMNS`, and their standard errors."""
     metrics, sensors = daylight.room_metrics, daylight.sensor_metrics
-    hours, error = _glare_hours(room, of_room, state)
-    figures = {name: float(metrics[name]) for name in COLUMNS[:3]} | {"glare_h": hours}
-    errors = {
+    return {name: float(metrics[name]) for name in COLUMNS[:3]}, {
         # the sensors' noise goes together
         "daylight_factor": float(sensors["daylight_factor_standard_error"].mean()),
         "da300": float(sensors["da300_standard_error"].mean()),
         "sda300_50": float(metrics["sda300_50_standard_error"]),
-        "glare_h": error,
     }
-    mean_error = float(daylight.relative_error.mean())
-    return PlannedRoom(room.space, figures, errors, mean_error, unshaded)
 
 
 def _glare_hours(room: RoomInputs, of_room: RoomLight, state: NDArray[np.int64]) -> tuple[float, float]:
@@ -180,23 +196,26 @@ def plan_table(rooms: Sequence[PlannedRoom]) -> str:
 def plan_page(rooms: Sequence[PlannedRoom]) -> str:
     """The first plan as a page that loads itself again until the report takes its place."""
     glare = gettext("Occupied hours with glare, by the light at the eye")
-    heads = (gettext("Room"), *map(_head, COLUMNS[:3]), glare)
+    heads = (gettext("Room"), *map(_head, COLUMNS[:3]), glare, gettext("All rays"))
     head = "".join(f"<th>{escape(text)}</th>" for text in heads)
     rows = []
     for room in rooms:
         cells = (f"<td>{figure} ± {error}</td>" for figure, error in _cells(room))
-        rows.append(f"<tr><td>{escape(room.space.label)}</td>{''.join(cells)}</tr>")
+        done = "✓" if room.complete else ""
+        rows.append(f"<tr><td>{escape(room.space.label)}</td>{''.join(cells)}<td>{done}</td></tr>")
     title = gettext("First plan")
     note = gettext(
         "From few rays, with the standard error of each figure. This page loads itself again every "
         "few seconds and shows the report as soon as the run is complete; if the run is stopped, "
         "the page stays as it is."
     )
+    count = sum(room.complete for room in rooms)
+    done = gettext("Light computed with all rays: {count} of {all} rooms.", count=count, all=len(rooms))
     return (
         f'<!doctype html><html><head><meta charset="utf-8"><title>{escape(title)}</title>'
         f'<meta http-equiv="refresh" content="{REFRESH_S}"><style>body{{font-family:sans-serif}}'
         "td,th{padding:.2em .8em;text-align:right}td:first-child,th:first-child{text-align:left}"
-        f"</style></head><body><h1>{escape(title)}</h1><p>{escape(note)}</p>"
+        f"</style></head><body><h1>{escape(title)}</h1><p>{escape(note)}</p><p>{escape(done)}</p>"
         f"<table><tr>{head}</tr>{''.join(rows)}</table></body></html>"
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import TEMPORARY
 from mitsuba_cfs.progress import silent
 from scenes import cli
+from scenes.commands.run import _FirstPlan
 from scenes.comply import comply
 from scenes.comply.files import read_files
 from scenes.comply.options import ComplyOptions
@@ -185,6 +187,28 @@ def test_files_of_the_first_plan_last_until_the_results(tmp_path):
     mark = FolderMark.read(tmp_path / "out")
     assert mark is not None and mark.files == ("report.html",)
     assert not (tmp_path / "out" / "first_plan.csv").exists()
+
+
+def test_the_page_of_the_first_plan_takes_the_light_of_rooms_as_they_come(two_rooms, tmp_path, monkeypatch):
+    """Through the command's own plan: each room's figures are those of the run, its hours of glare the plan's."""
+    inputs, options = two_rooms
+    monkeypatch.setattr(run, "FROM", 2)
+    monkeypatch.setattr("scenes.run.first_plan.REFRESH_S", 0)
+    pages: list[str] = []
+
+    class Kept(ResultFolder):
+        def early(self, files) -> None:
+            super().early(files)
+            pages.append((tmp_path / "out" / "report.html").read_text())
+
+    plan = _FirstPlan(Kept(tmp_path / "out", "run"), "en")
+    result = run_inputs(inputs, options, on_plan=plan, on_room=plan.light)
+    assert [page.count("✓") for page in pages] == [0, 1, 2]
+    assert "1 of 2 rooms" in pages[1]
+    assert set(re.findall(r"<td>([\d.]+) ± ", pages[0])) != set(re.findall(r"<td>([\d.]+) ± ", pages[2]))
+    for room in result.spaces:
+        assert f"<td>{room.daylight.room_metrics['daylight_factor']:.2f} ± " in pages[2]
+    assert plan.table == (tmp_path / "out" / "first_plan.csv").read_text(), "the table stays the first plan's"
 
 
 def test_results_of_an_earlier_run_stay_beside_a_first_plan(tmp_path):

@@ -48,7 +48,10 @@ def test_a_cellar_without_windows_needs_no_system(tmp_path, variant, capsys):
     text = f'weather = "{WEATHER}"\n{box}{ground}[loads]\nheating_c = 18\n'
     path.write_text(text, encoding="utf-8")
     assert main(["thermal", str(path), "--out", str(tmp_path / "out")]) == 0
-    assert "assumed: Not stated in the study: equipment 8 W/m2 (gains.equipment_w_m2), one person" in capsys.readouterr().out
+    assert (
+        "assumed: Not stated in the study: equipment 8 W/m2 (gains.equipment_w_m2), one person"
+        in capsys.readouterr().out
+    )
     hours = pd.read_csv(tmp_path / "out" / "hours.csv")
     assert hours["air_c"].min() > 18.0 - 1e-3 and hours["heating_w"].max() > 0.0
 
