@@ -104,3 +104,20 @@ def test_the_views_of_another_seed_or_depth_are_others(tmp_path):
     for changed in ({"seed": 4}, {"max_depth": 1}, {"samples": 128}):
         same(matrix(system, cache, **changed), matrix(system, None, **changed))
     assert files(tmp_path, "open-view") == 8
+
+
+@pytest.mark.parametrize(("normal", "wall", "lit"), [(-1.0, False, True), (1.0, False, False), (-1.0, True, False)])
+def test_sensors_that_see_no_sky_and_no_sun_have_no_light(normal, wall, lit):
+    """Their normals point away from the window, or a wall stands before it: no ray is left for the system."""
+    from mitsuba_cfs.trace.kernels.path_options import PathOptions
+    from mitsuba_cfs.trace.kernels.scattering import OpenWindow
+    from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix
+    from mitsuba_cfs.trace.sun.direct import direct_sun_matrix
+
+    room, groups = rooms.test_room()
+    before = rooms.surfaces([(rooms.quad((-99, -1, -99), (99, -1, -99), (99, -1, 99), (-99, -1, 99)), 0.0)])
+    scene = room, before if wall else rooms.NOTHING, groups, [OpenWindow()]
+    sensor = [[1.8, 1.0, 1.6]], [[0.0, normal, 0.0]]
+    view = straight_view_matrix(*scene, *sensor, paths=PathOptions(256, 1), subdivision=1)
+    sun = direct_sun_matrix(*scene, *sensor, suns=[[0.0, -1.0, 0.3]], window_points=64)
+    assert [bool(found.values.any()) for found in (view, sun)] == [lit, lit]

@@ -228,6 +228,8 @@ def straight_view_matrix(
 
     def one_group(g: int, system: Scattering, number: int) -> NDArray[np.float64]:
         view = rays.to_sky(g, number)
+        if not len(view.ray):  # no sensor sees the sky through it
+            return np.zeros((S, sky.size))
         tau = np.broadcast_to(system.through(rays.local(g, number, view.ray)).numpy(), len(view.ray))
         slot = (view.ray // np.uint32(n)).astype(np.int64) * sky.size + view.patch
         light = np.bincount(slot, view.weight * tau.astype(float), S * sky.size)
