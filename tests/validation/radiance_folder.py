@@ -56,7 +56,7 @@ class EvenBeams(KlemsScattering):
 
     def through(self, sun: mi.Vector3f) -> mi.Float:
         """See `Scattering`."""
-        return dr.gather(mi.Float, self._beams, self._bins.index(sun))
+        return dr.gather(mi.Float, self._beams, self.bins.index(sun))
 
 
 @dataclass(frozen=True)
