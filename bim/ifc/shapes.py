@@ -112,8 +112,8 @@ def read_shapes(
         for p in wanted
         if p.id() not in shapes
     ]
-    # the iterator gives shapes as its threads finish them, which no two runs do alike: in that
-    # order a model would have another hash in the cache, and other sums, each time it is read
+    # the iterator gives shapes as its threads finish them, in an order that changes from run to run: in
+    # that order a model would have another hash in the cache, and other sums, each time it is read
     return {p.id(): shapes[p.id()] for p in wanted if p.id() in shapes}, issues
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,24 @@ from mitsuba_cfs.matrices.cache import CacheEntry
 
 MOST_STORED = 1 << 25  # bytes of an entry: larger ones are computed again
 Arrays = Mapping[str, NDArray[Any]]
+T = TypeVar("T")
+
+
+def stored_or_computed(
+    entry: CacheEntry | None,
+    read: Callable[[Arrays], T | None],
+    compute: Callable[[], T],
+    parts: Callable[[T], Sequence[Arrays]],
+) -> T:
+    """What an entry of the cache holds, else what `compute` gives, which is written to it.
+
+    Args: read: from the arrays of a file, None where these are of no use; parts: for `write_parts`.
+    """
+    stored = None if entry is None else entry.read(read)
+    if stored is None:
+        stored = compute()
+        write_parts(entry, parts(stored))
+    return stored
 
 
 def write_parts(entry: CacheEntry | None, parts: Sequence[Arrays]) -> None:

@@ -108,7 +108,7 @@ def test_the_views_of_another_seed_or_depth_are_others(tmp_path):
 
 @pytest.mark.parametrize(("normal", "wall", "lit"), [(-1.0, False, True), (1.0, False, False), (-1.0, True, False)])
 def test_sensors_that_see_no_sky_and_no_sun_have_no_light(normal, wall, lit):
-    """Their normals point away from the window, or a wall stands before it: no ray is left for the system."""
+    """Their normals point away from the window, or a wall hides the sky: no ray is left for the system."""
     from mitsuba_cfs.trace.kernels.path_options import PathOptions
     from mitsuba_cfs.trace.kernels.scattering import OpenWindow
     from mitsuba_cfs.trace.matrices.straight_view import straight_view_matrix

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs.directions import sensors_of
 from mitsuba_cfs.matrices.cache import MatrixCache
-from mitsuba_cfs.matrices.stored_parts import MOST_STORED, Arrays, parts_of, write_parts
+from mitsuba_cfs.matrices.stored_parts import MOST_STORED, Arrays, parts_of, stored_or_computed
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup, even_numbers, points_on_triangles
@@ -268,10 +268,12 @@ class _SensorRays:
         if (group, number) not in self._ready:
             count = self._stopping.ahead(number)
             entry = self._paths.entry("open view", *self._inputs, group, number, count, by=__name__)
-            views = None if entry is None else entry.read(_views_of)
-            if views is None:
-                views = self._traced(group, number, count)
-                write_parts(entry, [view.arrays() for view in views])
+            views = stored_or_computed(
+                entry,
+                _views_of,
+                lambda: self._traced(group, number, count),
+                lambda traced: [view.arrays() for view in traced],
+            )
             self._ready.update({(group, number + i): view for i, view in enumerate(views)})
         return self._ready.pop((group, number))
 

@@ -13,8 +13,8 @@ from mitsuba_cfs.trace.kernels.sampling import vectors
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 
 FloatArray = NDArray[np.float64]
-# Projected area factors of a seated person: ahead and behind, to the sides, up and down (ISO 7726)
 ROOT = 1.1673039782614187  # of x^5 = x + 1
+# Projected area factors of a seated person: ahead and behind, to the sides, up and down (ISO 7726)
 SEATED = (0.30, 0.30, 0.22, 0.22, 0.18, 0.18)
 
 

@@ -23,7 +23,7 @@ from scipy import sparse
 
 from mitsuba_cfs.matrices.cache import CacheEntry, MatrixCache
 from mitsuba_cfs.matrices.packed import PackedArray
-from mitsuba_cfs.matrices.stored_parts import Arrays, parts_of, write_parts
+from mitsuba_cfs.matrices.stored_parts import Arrays, parts_of, stored_or_computed, write_parts
 from mitsuba_cfs.trace.kernels.estimate import cache_entry
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
@@ -116,12 +116,9 @@ def open_beam_light(
     Args: inputs: that it depends on beside the scenes.
     """
     entry = scenes.entry("beam in room", *inputs)
-    stored = None if entry is None else entry.read(_beams_of)
-    if stored is None:
-        stored = trace()
-        parts: list[Arrays] = [{"hours": one.hours, "light": one.light} for one in stored]
-        write_parts(entry, parts)
-    return stored
+    return stored_or_computed(
+        entry, _beams_of, trace, lambda beams: [{"hours": one.hours, "light": one.light} for one in beams]
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,11 +136,7 @@ def open_discs(scenes: SunScenes, inputs: tuple[object, ...], trace: Callable[[]
     Args: inputs: that it depends on beside the scenes.
     """
     entry = scenes.entry("sun discs", *inputs)
-    stored = None if entry is None else entry.read(_discs_of)
-    if stored is None:
-        stored = trace()
-        write_parts(entry, [_disc_arrays(discs) for discs in stored])
-    return stored
+    return stored_or_computed(entry, _discs_of, trace, lambda found: [_disc_arrays(discs) for discs in found])
 
 
 def open_sun(scenes: SunScenes, inputs: tuple[object, ...], trace: Callable[[], OpenSun]) -> OpenSun:
@@ -152,11 +145,7 @@ def open_sun(scenes: SunScenes, inputs: tuple[object, ...], trace: Callable[[], 
     Args: inputs: as of `open_discs`, and the batches.
     """
     entry = scenes.entry("sun on windows", *inputs)
-    stored = None if entry is None else entry.read(_open_sun_of)
-    if stored is None:
-        stored = trace()
-        write_parts(entry, [_open_sun_arrays(stored)])
-    return stored
+    return stored_or_computed(entry, _open_sun_of, trace, lambda sun: [_open_sun_arrays(sun)])
 
 
 def _sun_of(scenes: SunScenes, places: Sequence[SurfacePoints], suns: Suns) -> list[SunAtPoints]:

@@ -96,7 +96,7 @@ def sun_discs(around: SunScene, seed: int) -> SunDiscs:
     if not len(chosen):
         none = np.empty(0, dtype=np.uint32)
         return SunDiscs(none, none.astype(np.int16), none.astype(np.float32), none)
-    sensor, sun = _pair(around, column(chosen, mi.UInt32))
+    sensor, sun = _pair(column(chosen, mi.UInt32), dr.width(around.towards))
     stream = mi.sample_tea_32(sensor, dr.opaque(mi.UInt32, (seed ^ 0x3C6EF372) & 0xFFFFFFFF))[0]
     centre, turn = dr.gather(mi.Vector3f, around.towards, sun), lattice(sensor, stream, 4)
     found = _disc_samples(around, sensor, centre, turn, stream)
@@ -119,9 +119,10 @@ def crossed_discs(around: SunScene, crossed: NDArray[np.uint32], keys: mi.UInt32
     for start in range(0, len(crossed), step):
         some, part = crossed[start : start + step], slice(start, start + step)
         lane = dr.arange(mi.UInt32, count * len(some) * EDGE_RAYS)
-        row, each = lane // EDGE_RAYS, dr.opaque(mi.UInt32, len(some))
-        batch = row // each
-        sensor, sun = _pair(around, dr.gather(mi.UInt32, column(some, mi.UInt32), row - batch * each))
+        row = lane // EDGE_RAYS
+        batch, place = _pair(row, len(some))
+        number = dr.gather(mi.UInt32, column(some, mi.UInt32), place)
+        sensor, sun = _pair(number, dr.width(around.towards))
         centre = dr.gather(mi.Vector3f, around.towards, sun)
         # the sensor's alone: an hour's light does not depend on those computed with it
         stream = mi.sample_tea_32(sensor, dr.gather(mi.UInt32, keys, batch))[0]
@@ -144,7 +145,7 @@ def _disc_samples(
     around: SunScene, sensor: mi.UInt32, centre: mi.Vector3f, turn: mi.Float, stream: mi.UInt32
 ) -> tuple[mi.Float, mi.Int32, mi.Bool]:
     """Mean over rays inside the discs, the group of the first, and whether all rays agree."""
-    total, first, alike = mi.Float(0), mi.Int32(0), mi.Bool(True)
+    total, first, is_uniform = mi.Float(0), mi.Int32(0), mi.Bool(True)
     number = mi.UInt32(0)
     while number < RIM_RAYS + DISC_RAYS:
         inner = number >= RIM_RAYS
@@ -152,17 +153,10 @@ def _disc_samples(
         u = dr.select(inner, _spiral(number - RIM_RAYS, DISC_RAYS, stream), rim)
         value, group = _rays(around, sensor, disc_direction(centre, u))
         first = dr.select(number == 0, group, first)
-        alike &= group == first
+        is_uniform &= group == first
         total += dr.select(inner, mi.Float(1 / DISC_RAYS), 0.0) * value
         number += 1
-    return total, first, alike
-
-
-def _pair(around: SunScene, number: mi.UInt32) -> tuple[mi.UInt32, mi.UInt32]:
-    """Sensor and sun of each pair number."""
-    suns = dr.opaque(mi.UInt32, dr.width(around.towards))
-    sensor = number // suns
-    return sensor, number - sensor * suns
+    return total, first, is_uniform
 
 
 def _before_windows(around: SunScene) -> NDArray[np.bool_]:
@@ -213,10 +207,14 @@ def _meets_group(inside: TracedScene, group: int, origin: mi.Point3f, towards: m
 
 def pairs(first: int, second: int) -> tuple[mi.UInt32, mi.UInt32]:
     """Indices of all pairs [first * second], the second running fastest."""
-    index = dr.arange(mi.UInt32, first * second)
+    return _pair(dr.arange(mi.UInt32, first * second), second)
+
+
+def _pair(number: mi.UInt32, second: int) -> tuple[mi.UInt32, mi.UInt32]:
+    """Both indices of numbers of pairs."""
     size = dr.opaque(mi.UInt32, second)
-    row = index // size
-    return row, index - row * size
+    first = number // size
+    return first, number - first * size
 
 
 def _spiral(number: mi.UInt32, count: int, stream: mi.UInt32) -> mi.Point2f:
