@@ -319,12 +319,12 @@ def system(layers: Path, paths: int, seed: int, name: str, out: Path) -> None:
     from scenes.bsdf_generation import layers_file
 
     beside = out.with_suffix(".toml")
-    check_file(out, inputs=[layers])
-    if beside.absolute() != layers.absolute():
-        check_file(beside, inputs=[layers])
+    written = [out] if beside.absolute() == layers.absolute() else [out, beside]
+    for one in written:
+        check_file(one, inputs=[layers])
     file, text = layers_file(layers, paths=paths, seed=seed, name=name)
     write_bsdf_xml(file, out)
-    if beside.absolute() != layers.absolute():
+    if beside in written:
         write_text(beside, text)
     for band in file.bands:
         tau = direct_hemispherical(file.band(band), "transmission_front", [0.0, 0.0, 1.0])[0]
