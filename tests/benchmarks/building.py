@@ -146,7 +146,7 @@ def run_command(arguments: Sequence[str]) -> None:
 def main(building: Path, *, weather: Path, cfs: Path, space: Sequence[str] = (), cached: bool = False) -> None:
     """Print a line for each part."""
     with tempfile.TemporaryDirectory() as out, clocked() as clock:
-        line = [building, "--weather", weather, "--cfs", cfs, "--quick", "--out", Path(out) / "out"]
+        line = [building, "--weather", weather, "--cfs", cfs, "--quick", "--processes", 1, "--out", Path(out) / "out"]
         rooms = [text for one in space for text in ("--space", one)]
         run_command(["run", *map(str, line), *rooms, *([] if cached else ["--no-cache"])])
     for name, part in sorted(clock.parts.items(), key=lambda item: -item[1].seconds):
