@@ -1,19 +1,20 @@
 """Error of hourly illuminance against time: `cfs run`, Radiance's `rfluxmtx` and honeybee's recipes.
 
     python -m tests.benchmarks building_curve BUILDING.ifc --weather CITY.epw --recipes VENV/bin \
-        --space 111 --space 103 [--tau 0.6] [--keep FOLDER] [--figure FILE.png]
+        --space 111 --space 103 [--tau 0.6] [--before CHECKOUT] [--keep FOLDER] [--figure FILE.png]
 
 The rooms are exported once with `cfs export --honeybee`.  This model is the input of all: `cfs run`
 reads it; `cfs export --radiance` writes the folders whose `run.sh` runs `rfluxmtx`, `rmtxop` and
 `rcontrib` by the three- or the five-phase method; the recipes of lbt-recipes (`lbt-recipes` in VENV/bin) get it
 with a grid of the same sensors.  `run.sh` works on two rooms at a time, the recipe has two workers,
-Dr.Jit two threads.
+`cfs run` one core.
 
 Error: root mean square difference of all sensors and hours, divided by the reference's mean.  There
 are two references, a converged `cfs run` and a converged recipe, both with another seed or more rays
 than any run of the curve.  Processor seconds are those of the command and all that it starts;
 `tracing` is what `cfs run` spends on daylight matrices, sun and illuminance, and what the peers'
-`rcontrib` takes, which `rfluxmtx` starts.  `--keep`: a run whose result is in FOLDER is not repeated.
+`rcontrib` takes, which `rfluxmtx` starts.  `--before`: the `cfs` of an earlier version's checkout runs
+too, by the command alone.  `--keep`: a run whose result is in FOLDER is not repeated.
 """
 
 from __future__ import annotations
@@ -70,6 +71,8 @@ RUNS = {
     "--quick, samples x 8": [*PREVIEW, *_samples(8)],
     "--error 5%": ["--error", "5%"],
 }
+ONE_CORE = ("taskset", "-c", "0")  # where no thread of Dr.Jit waits for work by polling, 10 ms after each launch
+OF_BEFORE = ("--quick, samples / 8", "--quick", "--quick, samples x 8")
 OURS_CONVERGED = [*PREVIEW, *_samples(64), "--seed", "7"]
 # variables of run.sh: method, rays of a sensor, of a window's direction, bounces
 RFLUXMTX = {
@@ -147,13 +150,29 @@ def _cfs(arguments: Sequence[str]) -> None:
 
 def of_run(building: Building, options: Sequence[str], place: Path) -> tuple[Light, float]:
     """Illuminance of `cfs run`, and the processor seconds of its tracing."""
-    line = [str(building.model), "--weather", str(building.weather), "--out", str(place / "out"), "--ladybug"]
-    same = ["--sun-model", "radiance", "--processes", "1", "--no-cache", "--no-colour"]
     report = place / "tracing.txt"
     code = f"import sys; from {__name__} import write_tracing; write_tracing(sys.argv[1], sys.argv[2:])"
-    arguments = [sys.executable, "-c", code, str(report), "run", *line, *same, *options]
+    arguments = [*ONE_CORE, sys.executable, "-c", code, str(report), *_run_line(building, options, place)]
     subprocess.run(arguments, check=True, stdout=subprocess.DEVNULL)
-    return _ladybug(place / "out" / "ladybug"), float(report.read_text())
+    return _of_rooms(place / "out"), float(report.read_text())
+
+
+def of_before(building: Building, checkout: Path, options: Sequence[str], place: Path) -> tuple[Light, float]:
+    """The same of an earlier version, whose tracing has no clock."""
+    arguments = [*ONE_CORE, str(checkout / ".venv" / "bin" / "cfs"), *_run_line(building, options, place)]
+    subprocess.run(arguments, cwd=checkout, check=True, stdout=subprocess.DEVNULL)
+    return _of_rooms(place / "out"), np.nan
+
+
+def _run_line(building: Building, options: Sequence[str], place: Path) -> list[str]:
+    line = [str(building.model), "--weather", str(building.weather), "--out", str(place / "out")]
+    return ["run", *line, "--sun-model", "radiance", "--processes", "1", "--no-cache", "--no-colour", *options]
+
+
+def _of_rooms(folder: Path) -> Light:
+    """Hourly illuminance of a run's rooms."""
+    files = sorted(folder.glob("*/illuminance.parquet"))
+    return {file.parent.name: pd.read_parquet(file).to_numpy().T for file in files}
 
 
 def write_tracing(report: str, arguments: Sequence[str]) -> None:
@@ -280,10 +299,12 @@ def measured(
     ).astype(float)
 
 
-def curve(building: Building, *, kept: bool = False) -> pd.DataFrame:
+def curve(building: Building, *, before: Path | None = None, kept: bool = False) -> pd.DataFrame:
     """All runs with their times and errors; of those that are kept alone, with `kept`."""
     work: list[tuple[str, str, Callable[[Path], tuple[Light, float]]]] = []
     work += [("cfs run", name, partial(of_run, building, options)) for name, options in RUNS.items()]
+    if before is not None:
+        work += [("cfs run, before", name, partial(of_before, building, before, RUNS[name])) for name in OF_BEFORE]
     work += [("rfluxmtx", name, partial(of_rfluxmtx, building, values)) for name, values in RFLUXMTX.items()]
     work += [("recipe", name, partial(of_recipe, building, recipe)) for name, recipe in RECIPES.items()]
     references = {
@@ -373,6 +394,7 @@ def main(
     recipes: Annotated[Path, "folder of the program lbt-recipes"],
     space: Sequence[str] = (),
     tau: Annotated[float, "visible transmittance of the windows"] = 0.6,
+    before: Annotated[Path | None, "checkout of an earlier version, with its .venv"] = None,
     keep: Annotated[Path | None, "folder of results; those in it are not repeated"] = None,
     kept: Annotated[bool, "no run is made but the converged ones: only what is in --keep"] = False,
     figure: Annotated[Path | None, "PNG file to write"] = None,
@@ -385,7 +407,7 @@ def main(
         folder.mkdir(exist_ok=True)
         paths = (building.absolute(), weather.absolute())
         model = exported(*paths, space, tau, recipes.absolute(), folder)
-        table = curve(model, kept=kept)
+        table = curve(model, before=None if before is None else before.absolute(), kept=kept)
     if figure is not None:
         draw(table, figure)
     return {"Time and error": table, "Time of the peer / time of cfs run": ratios(table)}

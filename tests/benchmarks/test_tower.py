@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
+import numpy as np
 import pytest
+from ifcopenshell.util.placement import get_local_placement
 
 from bim.ifc.building import read_ifc
 from bim.shell import open_edges
 from tests.benchmarks import tower as benchmark
-from tests.benchmarks.tower import NORTH, ROOMS, SOUTH, tower
+from tests.benchmarks.tower import LENGTH, NORTH, OUTER, ROOMS, SOUTH, STREET, tower
 from tests.demo.make_office import HEIGHT
 from tests.scripts import run_script
 
@@ -30,17 +34,30 @@ def test_half_a_storey_is_refused(rooms):
         tower(rooms)
 
 
+def test_houses_stand_on_both_sides_of_a_street():
+    model = tower(80, houses=4)
+    names = [space.Name for space in model.by_type("IfcSpace")]
+    assert len(set(names)) == 80 and len(model.by_type("IfcBuildingStorey")) == 8
+    slabs = [slab for slab in model.by_type("IfcSlab") if slab.Name == "Roof"]
+    places = [get_local_placement(slab.ObjectPlacement)[:3, 3] for slab in slabs]
+    assert len({tuple(place.round(6)) for place in places}) == 4
+    apart = {round(float(abs(np.subtract(*pair)[1]) - LENGTH - 2 * OUTER), 6) for pair in combinations(places, 2)}
+    assert STREET in apart
+    with pytest.raises(ValueError, match="4 houses have a multiple of 40 rooms"):
+        tower(50, houses=4)
+
+
 def test_options_go_to_the_command(monkeypatch, capsys):
     asked = []
 
-    def measured(rooms, options, *, of):
-        asked.append((rooms, options, of))
+    def measured(rooms, options, *, houses, of):
+        asked.append((rooms, options, houses, of))
         return benchmark.Used(rooms, 10.0, 6.0, 1.0)
 
     monkeypatch.setattr(benchmark, "measured", measured)
     words = ["tower", "10", "30", "--of", "check", "--options=--processes 2"]
     assert run_script("tests.benchmarks", words) == 0
-    assert asked == [(10, ["--processes", "2"], "check"), (30, ["--processes", "2"], "check")]
+    assert asked == [(10, ["--processes", "2"], 1, "check"), (30, ["--processes", "2"], 1, "check")]
     assert "| 30 | 10.0 | 6 | 0.33 | 0.00 | 1.00 |" in capsys.readouterr().out
 
 

@@ -1,10 +1,11 @@
 """Processor seconds and peak memory of `cfs run --quick` for towers of more and more rooms.
 
-    python -m tests.benchmarks tower [ROOMS ...] [--of run|check|thermal] [--options "..."]
+    python -m tests.benchmarks tower [ROOMS ...] [--houses 10] [--of run|check|thermal] [--options "..."]
     python -m tests.benchmarks tower ROOMS --write FILE.ifc
 
 Each storey has nine offices with a window, five to the south and four to the north, and between
-them a corridor with a window at each end and a door to each office: ten rooms.  The building is
+them a corridor with a window at each end and a door to each office: ten rooms.  With `--houses` the
+rooms are those of so many equal houses on both sides of a street.  The building is
 written in IFC4 with the demo's constructions and glazing; the command gets the demo's weather and
 blind and a folder and a cache of its own.  `--of check`: `cfs check`, which reads the building
 alone; `--of thermal`: `cfs thermal --quick` with all rooms coupled; OPTIONS go to the command.
@@ -50,6 +51,7 @@ bsdf = "{blind}"
 [trace]
 view_factors = false
 """
+STREET, GAP = 15.0, 4.0  # between houses across the street, and side by side [m]
 SILL, DOOR = 0.9, (0.9, 2.1)  # of windows; width and height of a door [m]
 
 
@@ -63,30 +65,35 @@ class Used:
     memory: float  # at the peak of its biggest process [GB]
 
 
-def tower(rooms: int) -> ifcopenshell.file:
-    """The tower of that many rooms, a multiple of ten."""
-    if rooms <= 0 or rooms % ROOMS:
-        raise ValueError(f"a tower has a multiple of {ROOMS} rooms, not {rooms}")
+def tower(rooms: int, houses: int = 1) -> ifcopenshell.file:
+    """A tower of that many rooms, or houses on a street that have as many together: ten to a storey."""
+    storeys, rest = divmod(rooms, ROOMS * houses)
+    if rooms <= 0 or rest:
+        raise ValueError(f"{houses} houses have a multiple of {ROOMS * houses} rooms, not {rooms}")
     model = ifcopenshell.api.project.create_file(version="IFC4")
-    storey, body, axis = project(model)
+    first, body, axis = project(model)
     (building,) = model.by_type("IfcBuilding")
-    palette, storeys = None, rooms // ROOMS
-    for number in range(storeys):
-        if number:
-            storey = ifcopenshell.api.root.create_entity(model, ifc_class="IfcBuildingStorey", name=f"Storey {number}")
-            ifcopenshell.api.aggregate.assign_object(model, products=[storey], relating_object=building)
-        storey.Elevation = number * (HEIGHT + thickness("Ground floor"))
-        place = np.eye(4)
-        place[2, 3] = storey.Elevation
-        ifcopenshell.api.geometry.edit_object_placement(model, product=storey, matrix=place)
-        parts = Office(model, storey, body, axis, palette=palette)
-        palette = parts.palette
-        _storey(parts, number, top=number == storeys - 1)
+    palette = None
+    for house in range(houses):
+        origin = ((house // 2) * (WIDTH + 2 * OUTER + GAP), (house % 2) * (LENGTH + 2 * OUTER + STREET))
+        for number in range(storeys):
+            storey = first
+            if house or number:
+                name = f"Storey {number}" if houses == 1 else f"House {house + 1}, storey {number}"
+                storey = ifcopenshell.api.root.create_entity(model, ifc_class="IfcBuildingStorey", name=name)
+                ifcopenshell.api.aggregate.assign_object(model, products=[storey], relating_object=building)
+            storey.Elevation = number * (HEIGHT + thickness("Ground floor"))
+            place = np.eye(4)
+            place[2, 3] = storey.Elevation
+            ifcopenshell.api.geometry.edit_object_placement(model, product=storey, matrix=place)
+            parts = Office(model, storey, body, axis, palette=palette, origin=origin)
+            palette = parts.palette
+            _storey(parts, 100 * (house * storeys + number), top=number == storeys - 1)
     return model
 
 
-def _storey(parts: Office, number: int, *, top: bool) -> None:
-    """A storey's slabs, walls, windows, doors and rooms, heights from its floor."""
+def _storey(parts: Office, before: int, *, top: bool) -> None:
+    """A storey's slabs, walls, windows, doors and rooms, heights from its floor; names of rooms after a number."""
     outline = ((-OUTER, -OUTER), (WIDTH + OUTER, -OUTER), (WIDTH + OUTER, LENGTH + OUTER), (-OUTER, LENGTH + OUTER))
     parts.slab("Floor", "Ground floor", outline, -thickness("Ground floor"), "Grey floor")
     if top:
@@ -101,9 +108,9 @@ def _storey(parts: Office, number: int, *, top: bool) -> None:
         parts.wall(name, "Outer wall", start, end, HEIGHT, "White wall")
     for name, y in (("South corridor", DEPTH), ("North corridor", BACK - INNER)):
         parts.wall(name, "Partition", (0.0, y), (WIDTH, y), HEIGHT, "Light partition")
-    _offices(parts, 100 * number, "South", SOUTH, (0.0, DEPTH))
-    _offices(parts, 100 * number + SOUTH, "North", NORTH, (BACK, LENGTH))
-    parts.space(f"{100 * number + ROOMS}", "Corridor", (0.0, HALL), (WIDTH, BACK - INNER), HEIGHT)
+    _offices(parts, before, "South", SOUTH, (0.0, DEPTH))
+    _offices(parts, before + SOUTH, "North", NORTH, (BACK, LENGTH))
+    parts.space(f"{before + ROOMS}", "Corridor", (0.0, HALL), (WIDTH, BACK - INNER), HEIGHT)
     low = HALL + 0.5
     parts.window("Window west", "West wall", low, SILL, 1.0, 1.5)
     parts.window("Window east", "East wall", LENGTH - low - 1.0, SILL, 1.0, 1.5)
@@ -124,12 +131,12 @@ def _offices(parts: Office, before: int, side: str, count: int, between: tuple[f
         parts.door(f"Door {name}", f"{side} corridor", middle - DOOR[0] / 2, *DOOR)
 
 
-def measured(rooms: int, options: list[str], *, of: str = "run") -> Used:
-    """What a tower costs a command of `cfs`."""
+def measured(rooms: int, options: list[str], *, houses: int = 1, of: str = "run") -> Used:
+    """What a tower, or a street, costs a command of `cfs`."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         path = folder / "tower.ifc"
-        tower(rooms).write(str(path))
+        tower(rooms, houses).write(str(path))
         study = folder / "study.toml"
         study.write_text(STUDY.format(weather=WEATHER, blind=VENETIAN_BLIND))
         results = ["--quick", "--out", str(folder / "results")]
@@ -157,19 +164,20 @@ def _used(rooms: int, command: list[str], folder: Path) -> Used:
 def main(
     rooms: Sequence[int] = (10, 30, 100, 300),
     *,
+    houses: int = 1,
     of: Annotated[str, ("run", "check", "thermal")] = "run",
-    write: Annotated[Path | None, "write the first tower here, and no more"] = None,
+    write: Annotated[Path | None, "write the first building here, and no more"] = None,
     options: Annotated[str, "of the command, as one text"] = "",
 ) -> None:
-    """Print a line for each tower."""
+    """Print a line for each building."""
     if write is not None:
-        tower(rooms[0]).write(str(write))
+        tower(rooms[0], houses).write(str(write))
         return
     print("| rooms | processor s | elapsed s | by room | of each room more | GB |")
     print("|---" * 6 + "|")
     last = None
     for count in rooms:
-        used = measured(count, options.split(), of=of)
+        used = measured(count, options.split(), houses=houses, of=of)
         more = ""
         if last is not None and count > last.rooms:
             more = f"{(used.seconds - last.seconds) / (count - last.rooms):.2f}"

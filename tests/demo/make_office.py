@@ -196,13 +196,21 @@ class Office:
     """One storey being furnished with building elements; all lengths in metres."""
 
     def __init__(
-        self, model: ifcopenshell.file, storey: Entity, body: Entity, axis: Entity, *, palette: Palette | None = None
+        self,
+        model: ifcopenshell.file,
+        storey: Entity,
+        body: Entity,
+        axis: Entity,
+        *,
+        palette: Palette | None = None,
+        origin: Point = (0.0, 0.0),
     ) -> None:
         """Add to this storey, with bodies and axes in these contexts; heights from its elevation.
 
-        Args: palette: of a storey made before, where there is one.
+        Args: palette: of a storey made before, where there is one; origin: of plans on the site.
         """
         self._model, self._storey, self._body, self._axis = model, storey, body, axis
+        self._shift = _shift(*origin, storey.Elevation or 0.0)
         self.palette = Palette(model) if palette is None else palette
         self._walls: dict[str, tuple[Entity, NDArray[np.float64], float]] = {}
 
@@ -352,8 +360,7 @@ class Office:
         return made
 
     def _place(self, product: Entity, frame: NDArray[np.float64]) -> None:
-        placed = _shift(0.0, 0.0, self._storey.Elevation or 0.0) @ frame
-        ifcopenshell.api.geometry.edit_object_placement(self._model, product=product, matrix=placed)
+        ifcopenshell.api.geometry.edit_object_placement(self._model, product=product, matrix=self._shift @ frame)
 
     def _layered(self, product: Entity, layers: str, direction: str) -> None:
         """The layer set, from the reference line in the positive direction."""
