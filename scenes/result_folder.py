@@ -23,7 +23,7 @@ from mitsuba_cfs.files import TEMPORARY, json_text, reason, remove_stale, stale,
 MARK, PROGRAM, FORMAT = "cfs-results.json", "mitsuba-cfs", 1
 RENAMED = {"ifc export": "export"}  # commands by their earlier names, which marks may have
 EXPLORER = "explore"  # folder of the explorer, inside that of the results
-REPORT, FIRST_PLAN = "report.html", "first_plan.csv"
+REPORT, FIRST_PLAN, DOSSIER = "report.html", "first_plan.csv", "dossier.html"
 CASES = "cases"  # folder of the finished cases of a study, inside that of its results
 SYSTEMS = "systems"  # folder of the systems that a design made, inside that of its results
 

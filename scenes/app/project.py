@@ -38,7 +38,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import json_text, reason, write_text
 from scenes.comply.uses import UsesFile
 from scenes.input_files import read_weather
-from scenes.result_folder import remove_results
+from scenes.result_folder import DOSSIER, REPORT, remove_results
 from scenes.room.operation_tables import OperationTables
 from scenes.study.study_file import Study
 from scenes.toml_file import check_kinds, read_table
@@ -553,8 +553,8 @@ class Project:
 
 
 PAGES = {  # of a folder of results, by what they are called
-    "report": "report.html",
-    "dossier": "dossier.html",
+    "report": REPORT,
+    "dossier": DOSSIER,
     "explorer": "explore/index.html",
     "table": "results.csv",
     "check": "check.html",

@@ -26,6 +26,7 @@ from scenes.commands.room_options import (
     taken,
     write_ifc_option,
 )
+from scenes.commands.under_way import FirstPlanPage
 from scenes.comply.options import ComplyOptions
 from scenes.room.options import RoomOptions
 
@@ -127,7 +128,7 @@ def command(
     from mitsuba_cfs.files import check_file
     from scenes.comply.files import read_files
     from scenes.page_options import DossierSection, read_page
-    from scenes.result_folder import ResultFolder
+    from scenes.result_folder import DOSSIER, ResultFolder
 
     page_options = read_page(page, DossierSection, chosen_language())
     inputs = (building, options.weather, options.system, options.closed, options.operation)
@@ -143,20 +144,18 @@ def command(
     from scenes.commands.progress_bar import ProgressBar, compiled_beside
     from scenes.comply.comply import check_building
     from scenes.comply.outputs import answers, write_compliance, write_into_ifc
-    from scenes.run.first_plan import plan_lines
 
     if quick:
         click.echo(quick_run.NOTE)
     head = PrintedHead()
     with ProgressBar() as progress, compiled_beside():
-        result = check_building(
-            options, progress, files, head, on_plan=lambda rooms: click.echo("\n".join(plan_lines(rooms)))
-        )
+        plan = FirstPlanPage(folder, DOSSIER, page_options.language, refined=False)
+        result = check_building(options, progress, files, head, on_plan=plan)
         write_compliance(result, folder, quick=quick, page=page_options)
     for title, sentence in answers(result):
         click.echo(f"{title}: {sentence}")
     head.notes((*result.assumptions, *result.notes, *result.settings))
-    click.echo(f"dossier: {out / 'dossier.html'}")
+    click.echo(f"dossier: {out / DOSSIER}")
     if write_ifc is not None:
         for issue in write_into_ifc(result, write_ifc):
             click.echo(f"note: {issue.where}: {issue_text(issue, 'command').what}")

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
@@ -37,12 +34,9 @@ from scenes.commands.room_options import (
     taken,
     u_option,
 )
+from scenes.commands.under_way import FirstPlanPage
 from scenes.room.options import RoomOptions
 from scenes.run.options import JobOptions
-
-if TYPE_CHECKING:
-    from scenes.result_folder import ResultFolder
-    from scenes.run.first_plan import PlannedRoom
 
 LOADS = ("heating", "cooling", "lighting")
 NEED_PHASES = {
@@ -184,12 +178,12 @@ def run_to_folder(
     files = read_files(options)  # before anything heavy is loaded
     from scenes.commands.progress_bar import ProgressBar, compiled_beside
     from scenes.language.catalogue import in_language, ngettext
-    from scenes.result_folder import EXPLORER
+    from scenes.result_folder import EXPLORER, REPORT
     from scenes.run.run import Workers, run_job
 
     if options.quick:
         click.echo(quick_run.NOTE)
-    head, plan = PrintedHead(), _FirstPlan(folder, page_options.language)
+    head, plan = PrintedHead(), FirstPlanPage(folder, REPORT, page_options.language, refined=True)
     lines = _RoomLines(plan)
     with ProgressBar() as progress, compiled_beside():
         result = run_job(
@@ -231,47 +225,10 @@ def run_to_folder(
         click.echo(f"explorer: {out / EXPLORER / 'index.html'}")
 
 
-class _FirstPlan:
-    """Prints the first plan and writes it in the place of the report, with the light of rooms as they come."""
-
-    def __init__(self, folder: ResultFolder, language: str) -> None:
-        self._folder, self._language, self.table = folder, language, ""
-        self._rooms: dict[str, PlannedRoom] = {}  # by GUID
-        self._written = 0.0
-
-    def __call__(self, rooms: Sequence[PlannedRoom]) -> None:
-        from scenes.run.first_plan import plan_lines, plan_table
-
-        self.table = plan_table(rooms)
-        self._rooms = {room.space.guid: room for room in rooms}
-        self._write()
-        click.echo("\n".join(plan_lines(rooms)))
-
-    def light(self, room) -> None:
-        """Put the light of a room in the place of the first; the page is written every few seconds."""
-        from scenes.run.first_plan import REFRESH_S
-
-        planned = self._rooms.get(room.space.guid)
-        if planned is None:
-            return
-        self._rooms[room.space.guid] = planned.completed(room.daylight)
-        if time.monotonic() - self._written >= REFRESH_S:
-            self._write()
-
-    def _write(self) -> None:
-        from scenes.language.catalogue import in_language
-        from scenes.result_folder import FIRST_PLAN, REPORT
-        from scenes.run.first_plan import plan_page
-
-        with in_language(self._language):
-            self._folder.early({FIRST_PLAN: self.table, REPORT: plan_page(list(self._rooms.values()))})
-        self._written = time.monotonic()
-
-
 class _RoomLines:
     """The headline figures of each room as it comes: of its light first where heat comes later."""
 
-    def __init__(self, plan: _FirstPlan) -> None:
+    def __init__(self, plan: FirstPlanPage) -> None:
         self._lit: set[str] = set()
         self._plan = plan
 

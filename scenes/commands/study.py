@@ -30,11 +30,12 @@ from scenes.commands.room_options import (
     with_flags,
     write_ifc_option,
 )
+from scenes.commands.under_way import StudyPage
 
 if TYPE_CHECKING:
     from scenes.study.explored import ExploredCase
     from scenes.study.plan import Case, StudyPlan
-    from scenes.study.store import Store
+    from scenes.study.store import CaseResult, Store
     from scenes.study.study import StudyResult
     from scenes.study.study_file import Study
 
@@ -113,6 +114,7 @@ def study_to_folder(
     if parsed.quick:
         click.echo(quick_run.NOTE)
     plan = settled(parsed, plan_of(parsed))
+    pages = StudyPage(store, plan, page_options.language)
     chosen: dict[int, Case] = {}
     head = PrintedHead()
     processes = processes_for(len(plan.cases), processes)
@@ -126,7 +128,7 @@ def study_to_folder(
             processes=processes,
             scheduler=scheduler,
             progress=progress,
-            on_case=_print_case,
+            on_case=partial(_ready_case, pages),
             on_head=head,
         )
         nothing = result.failed == len(result.results)
@@ -223,6 +225,12 @@ def _print_explorer(case: Case, explored: ExploredCase) -> None:
     """One line for an explorer that could not be made."""
     if explored.error:
         click.echo(f"note: no explorer of {case.place}, {case.system}: {explored.error}")
+
+
+def _ready_case(page: StudyPage, case: Case, result: CaseResult, ready: int, total: int) -> None:
+    """Print a case that is ready, and put it on the page."""
+    _print_case(case, result, ready, total)
+    page(case, result)
 
 
 def _print_case(case, result, ready: int, total: int) -> None:

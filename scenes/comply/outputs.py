@@ -41,7 +41,7 @@ from scenes.report.page import environment, head_lines
 from scenes.report.page_files import page_files
 from scenes.report.room import RoomSection, facts
 from scenes.report.tables import Table, problems_table
-from scenes.result_folder import ResultFolder
+from scenes.result_folder import DOSSIER, ResultFolder
 
 NAMED = 4  # rooms that a sentence names; of more the rest is counted
 
@@ -561,7 +561,7 @@ def write_compliance(
         write_text(place / MODEL_CHECK.name, MODEL_CHECK.read_text("utf-8"))
         if any(any(missed(result.rules, room)) for room in result.rooms):
             write_room_topics(result, place / "issues.bcf")
-        write_text(place / "dossier.html", dossier_html(result, quick=quick, page=page))
+        write_text(place / DOSSIER, dossier_html(result, quick=quick, page=page))
 
 
 def write_into_ifc(result: Compliance, out: Path) -> tuple[Issue, ...]:

@@ -37,6 +37,11 @@ class Quantity:
     meaning: str = ""
     values: tuple[str, ...] = ()  # names of the values 0, 1, 2, ... where they are classes
 
+    @property
+    def with_unit(self) -> str:
+        """Label and unit, as a column's head."""
+        return self.label if self.unit in self.label else f"{self.label} [{self.unit}]"
+
 
 def _words() -> dict[str, Any]:
     """The package's table of quantities and the glossary."""

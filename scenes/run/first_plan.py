@@ -13,7 +13,6 @@ import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from html import escape
 from typing import Any
 
 import numpy as np
@@ -34,6 +33,7 @@ from mitsuba_cfs.progress import Progress, silent
 from scenes.inputs import Inputs
 from scenes.language.catalogue import gettext
 from scenes.report.names import quantity
+from scenes.report.under_way import page_under_way
 from scenes.results import DaylightResult
 from scenes.room.daylight import room_daylight
 from scenes.room.inputs import RoomInputs, skies_for
@@ -50,7 +50,6 @@ READ = {"eye", "plane"}  # what a rule of shading may read; others leave the fir
 GLARE = LIMITS[1]  # above it glare disturbs, EN 17037's medium level
 SET = 24  # rooms that are traced together: each has its surroundings in memory
 FROM = 6  # rooms; fewer are computed nearly as soon
-REFRESH_S = 5  # of the page
 COLUMNS = ("daylight_factor", "da300", "sda300_50", "glare_h")
 DIGITS = (2, 1, 0, 0)  # after the point
 
@@ -193,43 +192,34 @@ def plan_table(rooms: Sequence[PlannedRoom]) -> str:
     return str(without_formulas(pd.DataFrame(rows)).to_csv(index=False, float_format="%.4g"))
 
 
-def plan_page(rooms: Sequence[PlannedRoom]) -> str:
-    """The first plan as a page that loads itself again until the report takes its place."""
+def plan_page(rooms: Sequence[PlannedRoom], *, refined: bool = True) -> str:
+    """The first plan as a page that loads itself again until the report takes its place.
+
+    Args: refined: rooms get the light of the run as it comes.
+    """
     glare = gettext("Occupied hours with glare, by the light at the eye")
-    heads = (gettext("Room"), *map(_head, COLUMNS[:3]), glare, gettext("All rays"))
-    head = "".join(f"<th>{escape(text)}</th>" for text in heads)
-    rows = []
-    for room in rooms:
-        cells = (f"<td>{figure} ± {error}</td>" for figure, error in _cells(room))
-        done = "✓" if room.complete else ""
-        rows.append(f"<tr><td>{escape(room.space.label)}</td>{''.join(cells)}<td>{done}</td></tr>")
-    title = gettext("First plan")
-    note = gettext(
-        "From few rays, with the standard error of each figure. This page loads itself again every "
-        "few seconds and shows the report as soon as the run is complete; if the run is stopped, "
-        "the page stays as it is."
-    )
-    count = sum(room.complete for room in rooms)
-    done = gettext("Light computed with all rays: {count} of {all} rooms.", count=count, all=len(rooms))
-    return (
-        f'<!doctype html><html><head><meta charset="utf-8"><title>{escape(title)}</title>'
-        f'<meta http-equiv="refresh" content="{REFRESH_S}"><style>body{{font-family:sans-serif}}'
-        "td,th{padding:.2em .8em;text-align:right}td:first-child,th:first-child{text-align:left}"
-        f"</style></head><body><h1>{escape(title)}</h1><p>{escape(note)}</p><p>{escape(done)}</p>"
-        f"<table><tr>{head}</tr>{''.join(rows)}</table></body></html>"
-    )
+    heads = [gettext("Room"), *(quantity(name).with_unit for name in COLUMNS[:3]), glare]
+    rows = [[room.space.label, *(f"{figure} ± {error}" for figure, error in _cells(room))] for room in rooms]
+    paragraphs = [
+        gettext(
+            "From few rays, with the standard error of each figure. This page loads itself again every "
+            "few seconds and shows the report as soon as the run is complete; if the run is stopped, "
+            "the page stays as it is."
+        )
+    ]
+    if refined:
+        heads.append(gettext("All rays"))
+        for row, room in zip(rows, rooms, strict=True):
+            row.append("✓" if room.complete else "")
+        count = sum(room.complete for room in rooms)
+        paragraphs.append(gettext("Light computed with all rays: {count} of {all} rooms.", count=count, all=len(rooms)))
+    return page_under_way(gettext("First plan"), paragraphs, heads, rows)
 
 
 def _cells(room: PlannedRoom) -> Iterator[tuple[str, str]]:
     """The figures of a room and their errors, by `COLUMNS`, as text."""
     for name, digits in zip(COLUMNS, DIGITS, strict=True):
         yield f"{room.figures[name]:.{digits}f}", f"{room.errors[name]:.{digits}f}"
-
-
-def _head(name: str) -> str:
-    """Label and unit of a figure."""
-    of = quantity(name)
-    return of.label if of.unit in of.label else f"{of.label} [{of.unit}]"
 
 
 def options_for_error(options: RoomOptions, rooms: Sequence[PlannedRoom], error: float) -> RoomOptions:

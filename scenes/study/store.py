@@ -65,11 +65,11 @@ class Store:
             replacing: earlier results of other files are replaced, not refused.
         """
         self.folder, self._command = folder, command
-        self._results = ResultFolder(folder, command, inputs=inputs, replacing=replacing)
+        self.results = ResultFolder(folder, command, inputs=inputs, replacing=replacing)
 
     def open(self) -> None:
         """Make the folder, for cases to be kept in."""
-        self._results.checkpoints(CASES)
+        self.results.checkpoints(CASES)
 
     def load(self, key: str) -> CaseResult | None:
         """The finished case of that key; None where there is none, or none that can be read."""
@@ -85,7 +85,7 @@ class Store:
 
     def checkpoints(self, name: str) -> Path:
         """A folder for files that a later run uses again; it is never cleared."""
-        return self._results.checkpoints(name)
+        return self.results.checkpoints(name)
 
     def write(
         self,
@@ -106,7 +106,7 @@ class Store:
 
         table = pd.DataFrame(list(rows))
         text = json_text(manifest, indent=2, ensure_ascii=False, default=str)
-        with self._results.replaced() as place:
+        with self.results.replaced() as place:
             write_table(table, place / "results.parquet", index=False)
             write_table(table, place / "results.csv", index=False, float_format="%.6g")
             write_text(place / f"{self._command}.json", text + "\n")
@@ -119,7 +119,7 @@ class Store:
 
     def explorers(self) -> Path:
         """The folder of the cases' explorers, made; it is never cleared."""
-        return self._results.checkpoints(EXPLORER)
+        return self.results.checkpoints(EXPLORER)
 
     def _place(self, key: str) -> Path:
         return self.folder / CASES / f"{key}.npz"

@@ -19,7 +19,7 @@ from scenes.report.method import METHODS
 from scenes.report.names import quantity
 from scenes.report.room import error_words
 from scenes.results import DaylightResult, GlareResults, RoomYear, RunResult, ThermalResult
-from scenes.study.plan import Case
+from scenes.study.plan import Case, StudyPlan
 from scenes.study.store import CaseResult
 from scenes.study.study import StudyResult, facing
 
@@ -65,7 +65,7 @@ def case_page(study: StudyResult, number: int, room: RoomYear, beside: Sequence[
     by_hour = replace(room, daylight=replace(room.daylight, illuminance=median))
     return CasePage(
         number,
-        case_label(study, case),
+        case_label(study.plan, case),
         method_words(case),
         case.chosen,
         daylight_figures.plans(room, beside),
@@ -78,16 +78,16 @@ def case_page(study: StudyResult, number: int, room: RoomYear, beside: Sequence[
     )
 
 
-def case_label(study: StudyResult, case: Case) -> str:
+def case_label(plan: StudyPlan, case: Case) -> str:
     """The case in words, without what is the same in the whole study."""
-    room, *conditions = place_parts(study, case)
+    room, *conditions = place_parts(plan, case)
     return ", ".join(part for part in (room, case.system, *conditions) if part)
 
 
-def place_parts(study: StudyResult, case: Case) -> tuple[str, str, str, str]:
+def place_parts(plan: StudyPlan, case: Case) -> tuple[str, str, str, str]:
     """Room, climate, orientation and method of a case; empty where the study has only one."""
-    _, space = study.plan.rooms[case.scene]
-    cases = study.plan.cases
+    _, space = plan.rooms[case.scene]
+    cases = plan.cases
     room = case.room if case.space_name == case.room else f"{case.room} {case.space_name}"
     return (
         room if len({c.scene for c in cases}) > 1 else "",

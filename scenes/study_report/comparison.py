@@ -99,7 +99,7 @@ def scatter(study: StudyResult) -> Scatter:
     (x0, x1), (y0, y1) = round_limits([*x, 0.0, 100.0]), round_limits([*y, 0.0, 1.0])
 
     def words(case: Case, light: float, share: float) -> str:
-        values = {"case": case_label(study, case), "light": percent(light), "share": percent(share)}
+        values = {"case": case_label(study.plan, case), "light": percent(light), "share": percent(share)}
         if rated:
             return gettext("{case}: daylight {light} %, disturbing glare {share} %", **values)
         return gettext("{case}: daylight {light} %, overheating {share} %", **values)
@@ -155,7 +155,7 @@ def bars(study: StudyResult) -> tuple[Bar, ...]:
             continue
         shares = tuple((n, 100 * h / sum(hours)) for n, h in zip(CLASSES, hours, strict=True))
         words = ", ".join(f"{gettext(CLASS_WORDS[name])} {percent(share)} %" for name, share in shares)
-        label = case_label(study, case)
+        label = case_label(study.plan, case)
         found.append(Bar(number, label, shares, result.figures["da300"], words))
     return tuple(found)
 
@@ -186,7 +186,7 @@ def comparison_table(study: StudyResult) -> tables.Table:
     for number, case, result in finished(study):
         values = [_shown(c, result.figures.get(c)) for c in columns]
         method = gettext(METHODS[case.options.method]) + ("" if case.glare == "none" else f", {case.glare}")
-        rows.append((str(number), case_label(study, case), method, *values))
+        rows.append((str(number), case_label(study.plan, case), method, *values))
     return tables.Table(gettext("All cases"), headings, tuple(rows))
 
 
@@ -204,7 +204,7 @@ def failures_table(study: StudyResult) -> tables.Table:
         tables.Column(gettext("Description"), numeric=False),
         tables.Column(gettext("Error"), numeric=False),
     )
-    rows = [(str(i), case_label(study, c), r.error) for i, (c, r) in pairs if r.error]
+    rows = [(str(i), case_label(study.plan, c), r.error) for i, (c, r) in pairs if r.error]
     return tables.Table(gettext("Cases without a result"), columns, tuple(rows))
 
 

@@ -83,7 +83,7 @@ def study_verdict(study: StudyResult) -> Verdict:
     if assumed := assumed_thermal(study.head.assumed):
         sentences = (*sentences[:-1], (sentences[-1][0], f"{sentences[-1][1]} {assumed}"))
     limited = _limited(study)
-    rows = [(case_label(study, case), room, own) for case, room, own, _ in limited]
+    rows = [(case_label(study.plan, case), room, own) for case, room, own, _ in limited]
     return Verdict(
         question, _answers(study, limited), sentences, limits(rows, gettext("Case")), systems_by_room(study, limited)
     )
@@ -91,7 +91,7 @@ def study_verdict(study: StudyResult) -> Verdict:
 
 def _extremes(study: StudyResult, value: Callable[[CaseResult], float]) -> tuple[tuple[str, float], tuple[str, float]]:
     """Name and value of the case with least and of that with most."""
-    values = [(case_label(study, case), value(result)) for _, case, result in finished(study)]
+    values = [(case_label(study.plan, case), value(result)) for _, case, result in finished(study)]
     return min(values, key=lambda one: one[1]), max(values, key=lambda one: one[1])
 
 
@@ -158,7 +158,7 @@ def _heat(study: StudyResult) -> str:
 
 
 def _parts(study: StudyResult, label: str) -> str:
-    figures = next(r.figures for _, c, r in finished(study) if case_label(study, c) == label)
+    figures = next(r.figures for _, c, r in finished(study) if case_label(study.plan, c) == label)
     return " + ".join(rounded(float(figures[name]), 0) for name in ENERGIES)
 
 
@@ -192,7 +192,7 @@ def _answers_by_place(study: StudyResult, limited: Sequence[Limited]) -> tuple[t
     for case, _, own, result in limited:
         figures = result.figures
         energy = sum(figures[e] for e in ENERGIES) if set(ENERGIES) <= set(figures) else None
-        place = ", ".join(part for part in place_parts(study, case) if part)
+        place = ", ".join(part for part in place_parts(study.plan, case) if part)
         groups.setdefault(place, []).append((judged(case.system, own), energy))
     if all(len(members) == 1 for members in groups.values()):
         text = rooms_answer([replace(m[0][0], name=name) for name, m in groups.items() if name])
@@ -210,7 +210,7 @@ def systems_by_room(study: StudyResult, limited: Sequence[Limited]) -> Table | N
     systems = list(dict.fromkeys(case.system for case, *_ in limited))
     cells: dict[str, dict[str, str]] = {}
     for case, _, own, _ in limited:
-        place = ", ".join(part for part in place_parts(study, case) if part)
+        place = ", ".join(part for part in place_parts(study.plan, case) if part)
         one = judged(case.system, own)
         cells.setdefault(place, {})[case.system] = met_cell(one)
     if len(systems) < 2 or len(cells) < 2:
@@ -407,7 +407,7 @@ def _layers(study: StudyResult, scenes: list[str]) -> tuple[ColourLayer, ...]:
     for members in groups.values():
         if set(members) != set(scenes):
             continue
-        label = case_label(study, next(iter(members.values()))[0])
+        label = case_label(study.plan, next(iter(members.values()))[0])
         for column in SHOWN:
             q = quantity(column)
             values = np.concatenate([members[s][1].arrays[f"sensor/{column}"] for s in scenes])
@@ -510,7 +510,7 @@ def parallel(study: StudyResult) -> Parallel:
             for axis, value in own
             if not np.isnan(value)
         )
-        words = colon(f"{number}, {case_label(study, case)}", ", ".join(figures))
+        words = colon(f"{number}, {case_label(study.plan, case)}", ", ".join(figures))
         at = tuple(axis.at(value) for axis, value in own)
         lines.append(CaseLine(number, looks[case.system][0], at, words))
     return Parallel(axes, tuple(lines))
@@ -592,7 +592,7 @@ def write_study_explorer(study: StudyResult, folder: Path, page: PageOptions = O
     entries, first = [], next(iter(study.explored.values())).shown
     for number, explored in study.explored.items():
         case = study.plan.cases[number - 1]
-        name = f"{number}: {case_label(study, case)}"
+        name = f"{number}: {case_label(study.plan, case)}"
         about = {"id": f"case-{number}", "turned": case.orientation_deg % 360.0}
         for entry in explored.shown["rooms"]:
             entries.append(moved_entry(entry, explored.key, name) | about)

@@ -15,7 +15,7 @@ from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import TEMPORARY
 from mitsuba_cfs.progress import silent
 from scenes import cli
-from scenes.commands.run import _FirstPlan
+from scenes.commands.under_way import FirstPlanPage
 from scenes.comply import comply
 from scenes.comply.files import read_files
 from scenes.comply.options import ComplyOptions
@@ -193,7 +193,7 @@ def test_the_page_of_the_first_plan_takes_the_light_of_rooms_as_they_come(two_ro
     """Through the command's own plan: each room's figures are those of the run, its hours of glare the plan's."""
     inputs, options = two_rooms
     monkeypatch.setattr(run, "FROM", 2)
-    monkeypatch.setattr("scenes.run.first_plan.REFRESH_S", 0)
+    monkeypatch.setattr("scenes.report.under_way.REFRESH_S", 0)
     pages: list[str] = []
 
     class Kept(ResultFolder):
@@ -201,7 +201,7 @@ def test_the_page_of_the_first_plan_takes_the_light_of_rooms_as_they_come(two_ro
             super().early(files)
             pages.append((tmp_path / "out" / "report.html").read_text())
 
-    plan = _FirstPlan(Kept(tmp_path / "out", "run"), "en")
+    plan = FirstPlanPage(Kept(tmp_path / "out", "run"), "report.html", "en", refined=True)
     result = run_inputs(inputs, options, on_plan=plan, on_room=plan.light)
     assert [page.count("✓") for page in pages] == [0, 1, 2]
     assert "1 of 2 rooms" in pages[1]
@@ -209,6 +209,12 @@ def test_the_page_of_the_first_plan_takes_the_light_of_rooms_as_they_come(two_ro
     for room in result.spaces:
         assert f"<td>{room.daylight.room_metrics['daylight_factor']:.2f} ± " in pages[2]
     assert plan.table == (tmp_path / "out" / "first_plan.csv").read_text(), "the table stays the first plan's"
+
+
+def test_a_plan_that_is_not_refined_counts_no_rooms():
+    rooms = [planned("a", 0.02)]
+    assert "1 rooms" not in plan_page(rooms, refined=False) and "of 1 rooms" in plan_page(rooms)
+    assert plan_page(rooms, refined=False).count("<th>") == plan_page(rooms).count("<th>") - 1
 
 
 def test_results_of_an_earlier_run_stay_beside_a_first_plan(tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import signal
 import subprocess
@@ -319,6 +320,36 @@ def test_failed_cases_end_with_exit_1_and_their_number(tmp_path, capsys, monkeyp
     assert (tmp_path / "out" / "report.html").exists()
     table = pd.read_csv(tmp_path / "out" / "results.csv")
     assert list(table["status"]) == ["done", "failed", "done"]
+
+
+def test_a_page_of_the_cases_stands_in_the_place_of_the_report(tmp_path, capsys, monkeypatch):
+    """It has each case as it comes, stays where the study is stopped, and gives way to the report."""
+    from scenes.study import study as module
+
+    seen, stopped = [], []
+    page = tmp_path / "out" / "report.html"
+
+    def watched(case, *, progress=None):
+        seen.append(page.read_text() if page.exists() else "")
+        if case.orientation_deg == 20 and not stopped:
+            stopped.append(case)
+            raise KeyboardInterrupt
+        return _failing(case, progress=progress)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("scenes.report.under_way.REFRESH_S", 0)
+    monkeypatch.setattr("scenes.study_report.write_study_report", lambda _, path, _page: path.write_text("report"))
+    options = dict(module.run_study.__kwdefaults__) | {"compute": watched}
+    monkeypatch.setattr(module.run_study, "__kwdefaults__", options)
+    command = ["study", str(study_file(tmp_path, "orientations_deg = [0, 13, 20]\n")), "--out", "out"]
+    assert run(command) == 130
+    texts = [re.findall(r"Computed: (\d) of 3 cases", text) for text in seen]
+    assert texts == [[], ["1"], ["2"]]
+    assert page.read_text() == seen[2] and "0.1 is below tau" in seen[2] and seen[2].count("http-equiv") == 1
+    seen.clear()
+    assert run(command) == 1  # the failed case is tried again, the finished one is on the page
+    assert "Computed: 2 of 3 cases" in seen[1]
+    assert page.read_text() == "report"
 
 
 @pytest.mark.parametrize(
