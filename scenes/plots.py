@@ -47,13 +47,14 @@ def glare(year: RoomYear, axes: Axes | None = None) -> Axes:
         shown = sorted(year.glare.pictures, key=lambda picture: picture.hour)
         labels = [f"{times[picture.hour]:%d %b %H h}" for picture in shown]
         axes.bar(labels, [picture.glare["dgp"] for picture in shown], color="0.7")
-        axes.set_ylim(0.0, max(1.1 * year.glare.worst, LIMITS[-1] + 0.05))
+        axes.set_ylim(0.0, max(1.1 * (_worst(year) or 0.0), LIMITS[-1] + 0.05))
         for limit, name in zip(LIMITS, CLASSES[1:], strict=True):
             axes.axhline(limit, color="tab:red", linewidth=0.8)
             axes.text(0.002, limit, name, transform=axes.get_yaxis_transform(), va="bottom")
         axes.tick_params(axis="x", rotation=45)
         axes.set_ylabel("DGP")
-    axes.set_title(f"{year.space.label}: glare, at worst DGP {_worst(year):.2f}")
+    worst = _worst(year)
+    axes.set_title(f"{year.space.label}: glare, {'no picture' if worst is None else f'at worst DGP {worst:.2f}'}")
     return axes
 
 
@@ -72,8 +73,11 @@ def temperatures(year: RoomYear, axes: Axes | None = None) -> Axes:
     return axes
 
 
-def _worst(year: RoomYear) -> float:
-    return year.glare.worst if year.annual_glare is None else float(year.annual_glare["dgp"].max())
+def _worst(year: RoomYear) -> float | None:
+    """The highest DGP; None without a rated year and pictures."""
+    if year.annual_glare is not None:
+        return float(year.annual_glare["dgp"].max())
+    return year.glare.worst if year.glare.pictures else None
 
 
 def _carpet(times: pd.DatetimeIndex, values: np.ndarray, label: str, top: float, axes: Axes | None) -> Axes:

@@ -268,8 +268,8 @@ def _light_figures(room) -> str:
     direct = f"ASE {daylight['ase1000_250']:.0f} %, " if "ase1000_250" in daylight else ""
     return (
         f"sDA {daylight['sda300_50']:.0f} %, "
-        f"{direct}mean DA {daylight['da300']:.0f} %, "
-        f"worst DGP {room.glare.worst:.2f}"
+        f"{direct}mean DA {daylight['da300']:.0f} %"
+        f"{f', worst DGP {room.glare.worst:.2f}' if room.glare.pictures else ''}"
     )
 
 

@@ -147,11 +147,11 @@ def worst_hours(year: pd.DataFrame, count: int) -> list[int]:
     days: set = set()
     for hour in order.tolist():
         day = year.index[hour].date()
+        if len(chosen) >= count:
+            break
         if day not in days and year["dgp"].iloc[hour] == year["dgp"].iloc[hour]:
             chosen.append(hour)
             days.add(day)
-        if len(chosen) == count:
-            break
     return chosen
 
 
@@ -203,6 +203,8 @@ def default_hours(
 
     Args: eye_illuminance: [L] vertical illuminance at the eye in the lit hours [lx].
     """
+    if count <= 0:
+        return []
     moments = [datetime(2000, *day, clock) for day in DEFAULT_DAYS for clock in DEFAULT_CLOCK]
     lit_set = set(lit.tolist())
     usual = [hour for moment in moments if (hour := hour_index(moment, times)) in lit_set]
@@ -227,7 +229,10 @@ def room_glare(
         hours: indices; none: the worst hours of `year`, else `default_hours`.
         year: `annual_glare`.
     """
-    outputs, lit_state = room.options.outputs, light.states(state)
+    outputs = room.options.outputs
+    if not hours and not outputs.picture_count:
+        return GlareResults(light.scene.view, (), rating_of(outputs).rule)
+    lit_state = light.states(state)
     if not hours and year is not None:
         hours = worst_hours(year, min(WORST, outputs.picture_count))
     if not hours:

@@ -170,7 +170,8 @@ def _write_room(room: RoomYear, times: pd.DatetimeIndex, place: Path) -> None:
     _csv(metrics, place / "daylight_metrics.csv")
     _csv(pd.DataFrame([room.daylight.room_metrics]), place / "room_metrics.csv", index=False)
     _write_grids(room.daylight.grids, place)
-    _csv(glare_table(room.glare, times), place / "dgp.csv")
+    if room.glare.pictures:
+        _csv(glare_table(room.glare, times), place / "dgp.csv")
     heat = room.heat
     _csv(heat.temperatures.join([heat.gains, heat.comfort]), place / "temperatures.csv")
     if room.operation is not None:

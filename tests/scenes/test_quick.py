@@ -153,6 +153,7 @@ def test_one_picture_is_the_brightest_hours() -> None:
     eye[4000] = 1e4
     every = default_hours(times, lit, eye, 10)
     assert len(every) == 10 and every[-1] == lit[4000]
+    assert default_hours(times, lit, eye, 0) == []
     assert default_hours(times, lit, eye, 1) == [lit[4000]]
     assert default_hours(times, lit, eye, 3) == [*every[:2], lit[4000]]
     eye[np.flatnonzero(lit == every[4])] = 2e4

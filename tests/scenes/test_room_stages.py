@@ -105,3 +105,11 @@ def test_a_stage_that_is_run_twice_takes_the_sum_of_both(monkeypatch) -> None:
         with times.stage("glare"):
             pass
     assert times.seconds == {"glare": 3.5}
+
+
+def test_without_pictures_none_is_rated(variant, glass, weather, skies, monkeypatch) -> None:
+    monkeypatch.setattr("scenes.room.glare.rated_pictures", computed)
+    given = BOX, ROOM, in_all_windows(ROOM, glass), weather
+    assert not lit_room(*given, FEW.changed(picture_count=0), skies=skies).glare.pictures
+    with pytest.raises(Computed):
+        lit_room(*given, FEW, skies=skies)

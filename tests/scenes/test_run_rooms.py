@@ -231,6 +231,7 @@ def test_glare_of_the_year_is_that_of_the_pictures(variant, weather, skies, glas
     assert np.flatnonzero(np.isfinite(year)).tolist() == list(HOURS)
     for picture in found.glare.pictures:
         assert year[picture.hour] == pytest.approx(picture.glare["dgp"], abs=1e-6)
+    assert worst_hours(found.annual_glare, 0) == []
     assert worst_hours(found.annual_glare, 2) == np.argsort(-np.nan_to_num(year))[:2].tolist()
     with pytest.raises(ValueError, match="annual glare"):
         replace(options, method="point-in-time")
