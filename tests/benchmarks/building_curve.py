@@ -32,7 +32,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
@@ -80,6 +80,7 @@ RFLUXMTX = {
     "three-phase, -ad 2000": {"PHASES": 3, "INDOORS": 2_000, "OUTDOORS": 200, "BOUNCES": 6},
     "three-phase, -ad 8000": {"PHASES": 3, "INDOORS": 8_000, "OUTDOORS": 500, "BOUNCES": 6},
     "five-phase, -ad 500": {"PHASES": 5, "INDOORS": 500, "OUTDOORS": 100, "STRAIGHT": 500, "BOUNCES": 6},
+    "five-phase, -ad 8000": {"PHASES": 5, "INDOORS": 8_000, "OUTDOORS": 500, "STRAIGHT": 500, "BOUNCES": 6},
 }
 SIMPLE, ENHANCED = "annual-daylight", "annual-daylight-enhanced"
 RECIPES = {  # the default; levels of Ladybug Tools (`recommended_parameters` of rfluxmtx)
@@ -361,6 +362,7 @@ def draw(table: pd.DataFrame, path: Path) -> None:
     """Error against processor seconds, whole commands and tracing alone (PNG)."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.ticker import LogLocator
 
     figure = Figure(figsize=(9, 3.8), dpi=130, layout="constrained")
     FigureCanvasAgg(figure)
@@ -372,11 +374,13 @@ def draw(table: pd.DataFrame, path: Path) -> None:
             by_time = rows.sort_values(measure)
             axes.plot(by_time[measure], by_time["error %"], "o-", label=program, markersize=4, linewidth=1)
             for _, row in by_time.iterrows():
-                at = (row[measure], row["error %"])
-                axes.annotate(row["settings"], at, xytext=(4, 4), textcoords="offset points", fontsize=5.5)
+                at, last = (row[measure], row["error %"]), row[measure] == table[measure].max()
+                side: dict[str, Any] = {"ha": "right", "xytext": (4, 5)} if last else {"xytext": (4, 4)}
+                axes.annotate(row["settings"], at, textcoords="offset points", fontsize=5.5, **side)
         axes.set(xscale="log", yscale="log", xlabel="processor time [s]", title=title)
         axes.margins(x=0.3, y=0.15)
         for axis in (axes.xaxis, axes.yaxis):
+            axis.set_minor_locator(LogLocator(subs=(2, 5)))
             axis.set_major_formatter("{x:g}")
             axis.set_minor_formatter("{x:g}")
             axis.set_tick_params(which="both", labelsize=6)
