@@ -45,7 +45,12 @@ def test_parts_without_the_sun_and_the_whole_year(sky):
 def test_the_sun_alone_for_the_methods_is_made_once(sky):
     alone = sky.lit_sun
     assert (alone.toarray() if hasattr(alone, "toarray") else alone).tolist() == sky.sun.tolist()
-    assert sky.lit_sun is alone
+    assert sky.lit_sun is alone is sky.lit_sun_in(np.arange(3))
+    for lit in (alone, sky.sun):
+        some = replace(sky)
+        some._lit_sun.append(lit)
+        part = some.lit_sun_in(np.array([2, 0]))
+        assert (part.T.toarray() if hasattr(part, "toarray") else part).tolist() == sky.sun[:, [2, 0]].tolist()
     assert sky.sun_alone().tolist() == sky.sun.tolist()
     assert sky.sun_alone([2]).tolist() == [[3], [0]]
     bare = replace(sky, sun=None)
