@@ -39,7 +39,6 @@ class ArrayArchive(Mapping[str, NDArray[Any]]):
         sparse = self._sparse[name]
         with self._archive.open(name + (SPARSE if sparse else WHOLE)) as stream:
             array: NDArray[Any] = _read_sparse(stream) if sparse else npy.read_array(stream, allow_pickle=False)
-            stream.read()  # to the end, where the checksum is compared
         return array
 
     def __iter__(self) -> Iterator[str]:
