@@ -63,10 +63,12 @@ def wrong_encoding(content: bytes) -> str | None:
 
 
 @contextmanager
-def replacing(path: str | PathLike[str], *, field: str | None = None) -> Iterator[Path]:
+def replacing(path: str | PathLike[str], *, field: str | None = None, clears: bool = True) -> Iterator[Path]:
     """A temporary file beside `path`, renamed to it at the end or deleted after an error.
 
     A link is followed to the file that it names; a device or pipe is written to as it is.
+
+    Args: clears: the folder of temporaries whose process was killed (`remove_stale`) first.
 
     Raises: `DataError` that names `path` and says why it cannot be written.
     """
@@ -78,7 +80,8 @@ def replacing(path: str | PathLike[str], *, field: str | None = None) -> Iterato
         return
     target = Path(os.path.realpath(path))
     with _told(path, target, field):
-        remove_stale(target.parent)
+        if clears:
+            remove_stale(target.parent)
         part, release = _held(target.parent, target.suffix, lambda part: part.touch(exist_ok=False))
     try:
         with _told(path, part, field, probe=part):

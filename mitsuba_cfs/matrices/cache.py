@@ -9,13 +9,14 @@ from __future__ import annotations
 
 import hashlib
 import logging
+import marshal
 import os
-import time
 import zipfile
 import zlib
 from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,14 +25,17 @@ from numpy.typing import NDArray
 from platformdirs import user_cache_path
 
 from mitsuba_cfs.errors import DataError
-from mitsuba_cfs.files import opened_arrays, replacing
+from mitsuba_cfs.files import remove_stale, replacing
+from mitsuba_cfs.matrices.archive import opened_archive, write_archive
 from mitsuba_cfs.source_code import code_version
 
 VARIABLE = "CFS_CACHE"  # environment variable with the folder
 DEFAULT_LIMIT = 4 << 30  # [bytes] of all files; the longest unused go first
 SMALL = 500  # files of less than the limit divided by this, as a building's, go after all others
+UNLISTED = 64  # the limit divided by this is what a process writes before it lists the folder again
 RECENT_HASHES = 32  # of dataclasses
-PLAIN = {type(None), bool, int, float, str, bytes}  # whose `repr` tells values apart
+PLAIN = {type(None), bool, int, float, str, bytes}  # which `marshal` tells apart
+PLAIN_FORMAT = 2  # of `marshal`: the last one whose bytes follow from the values alone
 # RuntimeError: of zipfile, for a damaged file that seems encrypted or otherwise compressed
 UNREADABLE = (
     OSError,
@@ -49,6 +53,7 @@ UNREADABLE = (
 log = logging.getLogger(__name__)
 T = TypeVar("T")
 Inputs = tuple[object, ...]
+_unlisted: dict[Path, int] = {}  # bytes that this process wrote to a folder since it last listed the files
 
 
 class RecentResults:
@@ -134,8 +139,8 @@ class MatrixCache:
 
     @classmethod
     def of_user(cls) -> MatrixCache:
-        """The user's cache."""
-        return cls(default_folder())
+        """The user's cache, the same one in all of a process."""
+        return _of_folder(default_folder())
 
     def entry(self, label: str, *inputs: object, by: str) -> CacheEntry:
         """The file of the matrix that a module computes from these inputs.
@@ -150,16 +155,32 @@ class MatrixCache:
 
         Small ones go last: they free little space and are often the dearest, as a building's.
         """
-        result = [(file, _status(file)) for file in self.folder.glob("*.npz")]
+        with os.scandir(self.folder) as listed:
+            result = [(file.path, _status(file)) for file in listed if file.name.endswith(".npz")]
         files = [(file, status) for file, status in result if status]
-        files.sort(key=lambda item: (item[1].st_size * SMALL < self.limit, item[1].st_mtime))
         total = sum(status.st_size for _, status in files)
+        _unlisted[self.folder] = 0
+        if total <= self.limit:
+            return
+        files.sort(key=lambda item: (item[1].st_size * SMALL < self.limit, item[1].st_mtime))
         for file, status in files:
             if total <= self.limit:
                 break
-            if file != keep:
-                file.unlink(missing_ok=True)
+            if file != str(keep):
+                Path(file).unlink(missing_ok=True)
                 total -= status.st_size
+
+    def trim_seldom(self, written: Path) -> None:
+        """`trim` at a process' first file in a folder, and after each 64th of the limit that it writes.
+
+        Every file lists all others otherwise.  The folder holds at most the limit and a 64th of it
+        for each process that writes.
+        """
+        unlisted = _unlisted.get(self.folder, self.limit) + written.stat().st_size
+        _unlisted[self.folder] = unlisted
+        if unlisted * UNLISTED >= self.limit:
+            remove_stale(self.folder)
+            self.trim(keep=written)
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +193,7 @@ class CacheEntry:
     def read(self, content: Callable[[Mapping[str, NDArray[Any]]], T | None]) -> T | None:
         """What `content` makes of the stored arrays; None if there are none that can be read."""
         try:
-            with opened_arrays(self.path) as data:
+            with opened_archive(self.path) as data:
                 result = content(data)
             os.utime(self.path)  # used now
         except FileNotFoundError:
@@ -191,10 +212,10 @@ class CacheEntry:
             return False
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            with replacing(self.path) as part:
-                _write_arrays(part, arrays)
+            with replacing(self.path, clears=False) as part:
+                write_archive(part, arrays)
             if finished:
-                self.cache.trim(keep=self.path)
+                self.cache.trim_seldom(self.path)
         except (OSError, DataError) as error:
             log.warning("the matrix is not cached: %s", error)
             return False
@@ -204,31 +225,19 @@ class CacheEntry:
         """The stored state of batches; None if there is none, or none that can be read."""
         return self.read(_batch_mean)
 
+    def matrix(self) -> NDArray[np.float64] | None:
+        """The matrix of `cached_or_computed`; None if there is none, or none that can be read."""
+        return self.read(lambda data: np.asarray(data["matrix"], dtype=float))
+
     def save(self, state: BatchMean) -> None:
         """Write the state of batches."""
         arrays = {one.name: getattr(state, one.name) for one in fields(state)}
         self.write(arrays, finished=state.finished)
 
 
-def _write_arrays(path: Path, arrays: Mapping[str, object]) -> None:
-    """An archive as of `np.savez`, in which arrays that are mostly zeros, or bytes with a sign, are compressed.
-
-    Matrices of windows and patches are 75 to 99 % zeros: 8 to 50 times smaller at 200 to 400 MB/s, as
-    bytes of which hours see a point; others shrink little, and take ten times as long.
-    """
-    with zipfile.ZipFile(path, "w", compresslevel=1) as archive:
-        for name, value in arrays.items():
-            array = np.asanyarray(value)
-            mostly_zero = array.dtype.kind == "f" and 2 * np.count_nonzero(array) < array.size
-            small = mostly_zero or array.dtype == np.int8
-            archive.compression = zipfile.ZIP_DEFLATED if small else zipfile.ZIP_STORED
-            with archive.open(f"{name}.npy", "w", force_zip64=True) as stream:
-                np.lib.format.write_array(stream, array, allow_pickle=False)
-
-
 def _batch_mean(data: Mapping[str, NDArray[Any]]) -> BatchMean | None:
     """None where the shapes do not go together."""
-    mean, spread, covariance = (data[n].astype(float) for n in ("mean", "spread", "covariance"))
+    mean, spread, covariance = (data[n].astype(float, copy=False) for n in ("mean", "spread", "covariance"))
     count, seconds, finished = int(data["count"]), float(data["seconds"]), bool(data["finished"])
     shape = mean.shape
     whole = count > 0 and spread.shape == shape and covariance.shape[:-2] == shape[:-1]
@@ -237,15 +246,18 @@ def _batch_mean(data: Mapping[str, NDArray[Any]]) -> BatchMean | None:
 
 def cached_or_computed(entry: CacheEntry | None, compute: Callable[[], NDArray[np.float64]]) -> NDArray[np.float64]:
     """Return the cached matrix, or compute and store it: for matrices without batches."""
-    cached = None if entry is None else entry.load()
-    if cached is not None and cached.finished:
-        return cached.mean
-    start = time.monotonic()
+    cached = None if entry is None else entry.matrix()
+    if cached is not None:
+        return cached
     matrix = compute()
     if entry is not None:
-        none, seconds = np.zeros_like(matrix), time.monotonic() - start
-        entry.save(BatchMean(1, matrix, none, none[..., :1, None], seconds, finished=True))
+        entry.write({"matrix": matrix})
     return matrix
+
+
+@cache
+def _of_folder(folder: Path) -> MatrixCache:
+    return MatrixCache(folder)
 
 
 def digest(*values: object, hashes: RecentHashes | None = None) -> str:
@@ -272,7 +284,7 @@ def _feed(state: hashlib._Hash, value: object) -> None:
     """Add a value with its type and size, so that no two different inputs look alike."""
     if isinstance(value, np.ndarray):
         state.update(f"array {value.dtype.str} {value.shape};".encode())
-        state.update(np.ascontiguousarray(value).tobytes())
+        state.update(np.ascontiguousarray(value).reshape(-1).view(np.uint8).data)
     elif is_dataclass(value) and not isinstance(value, type):
         state.update(f"{type(value).__qualname__} {len(fields(value))};".encode())
         for item in fields(value):
@@ -281,7 +293,7 @@ def _feed(state: hashlib._Hash, value: object) -> None:
         plain = set(map(type, value)) <= PLAIN
         state.update(f"{'plain ' if plain else ''}sequence {len(value)};".encode())
         if plain:
-            _feed(state, repr(tuple(value)))
+            state.update(marshal.dumps(tuple(value), PLAIN_FORMAT))
         else:
             for item in value:
                 _feed(state, item)
@@ -292,7 +304,7 @@ def _feed(state: hashlib._Hash, value: object) -> None:
         raise ValueError(f"cannot hash a {type(value).__name__}")
 
 
-def _status(file: Path) -> os.stat_result | None:
+def _status(file: os.DirEntry[str]) -> os.stat_result | None:
     try:
         return file.stat()
     except OSError:

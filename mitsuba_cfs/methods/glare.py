@@ -117,8 +117,8 @@ def hourly_glare(
         if len(columns) == len(chosen):
             table[:, columns] = cached_or_computed(entry, partial(rated, i, columns))
         else:
-            stored = None if entry is None else entry.load()
-            table[:, columns] = rated(i, columns) if stored is None else stored.mean[:, columns]
+            stored = None if entry is None else entry.matrix()
+            table[:, columns] = rated(i, columns) if stored is None else stored[:, columns]
     return AnnualGlare(**dict(zip(FIGURES, table, strict=True)), rule=options.rule)
 
 

@@ -587,7 +587,7 @@ def _cell_samples(sampling: Sampling, cells: Sequence[Cells]) -> int:
 
 
 def _parts_of_cells(
-    groups: Sequence[WindowGroup], cells: Sequence[Cells], daylight: Sequence[NDArray[np.float64]], sampling: Sampling
+    groups: Sequence[WindowGroup], cells: Sequence[Cells], daylight: Sequence[NDArray[np.float32]], sampling: Sampling
 ) -> Parts:
     """The parts of groups by the light of their cells."""
     lights = map(CellLight, groups, cells, daylight)

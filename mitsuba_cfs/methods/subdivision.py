@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,8 +39,15 @@ class CellLight:
 
     group: WindowGroup
     cells: Cells
-    daylight: Array  # [C, K, P] of Reinhart's sky of MF 1
+    daylight: NDArray[np.floating]  # [C, K, P] of Reinhart's sky of MF 1
     regions: tuple[Region, ...] = (Region.everything(),)
+
+    def luminance(self, sky: Array) -> Array:
+        """Luminance before the cells [C, K, H] under skies [P, H], in double precision.
+
+        Cell by cell: D of all cells is large.
+        """
+        return np.stack([one.astype(float) @ sky for one in self.daylight])
 
     def error(self, points: Array, normals: Array, transmission: Array, sky: Array) -> Array:
         """Error of the direct light from the windows by D's means over the parts [S, H].
@@ -49,7 +57,7 @@ class CellLight:
             transmission: T [K, K] of the group's system.
             sky: [P, H] luminance of Reinhart's sky of MF 1.
         """
-        inside = np.einsum("kj,cjh->ckh", transmission, self.daylight @ sky, optimize=True)
+        inside = np.einsum("kj,cjh->ckh", transmission, self.luminance(sky), optimize=True)
         return np.abs(DirectLight(self, points, normals).error(inside, self.regions))
 
 
@@ -148,21 +156,22 @@ def subdivided(light: CellLight, parts: int | None = None, *, limit: float = LIM
     Each cut, across height or width or between windows of different depth, is the one that leaves
     the least variance of the cells' luminance under five skies.
     """
-    outside = light.daylight @ reference_skies()  # [C, K, H]
+    outside = light.luminance(reference_skies())
     judge = Judge(light, outside)
     weight = np.sqrt(KLEMS_FULL.projected_solid_angles() / np.pi)[:, None]
     bright = np.maximum(level(outside), DARK)
     seen = (outside * weight / bright).reshape(len(outside), -1)
-    regions = light.regions
+    regions = list(light.regions)
+    cuts: list[_Cut] = []
     most = min(MOST_PARTS if parts is None else parts, len(seen))
     while len(regions) < most and (parts is not None or judge.error(regions) > limit):
-        cuts = [cut for region in regions if (cut := _best_cut(light.cells, region, seen))]
-        if not cuts:
+        cuts += [_best_cut(light.cells, region, seen) for region in regions[len(cuts) :]]
+        best = max(range(len(cuts)), key=lambda i: cuts[i].gain)
+        cut = cuts.pop(best)
+        if cut.gain < 0:
             break
-        _, region, axis, place = max(cuts, key=lambda cut: cut[0])
-        others = [r for r in regions if r is not region]
-        regions = (*others, *region.halves(axis, place))
-    return replace(light, regions=regions)
+        regions += regions.pop(best).halves(cut.axis, cut.place)
+    return replace(light, regions=tuple(regions))
 
 
 class Judge:
@@ -223,19 +232,29 @@ def level(luminance: Array) -> Array:
     return np.einsum("ckh,k->h", luminance, omega / np.pi)[None, None] / len(luminance)
 
 
-def _best_cut(cells: Cells, region: Region, seen: Array) -> tuple[float, Region, int, float] | None:
+class _Cut(NamedTuple):
+    """A plane across an axis of the frame."""
+
+    gain: float = -1.0  # variance of the cells' luminance that it removes; below 0 where no plane cuts
+    axis: int = 0
+    place: float = 0.0  # [m]
+
+
+def _best_cut(cells: Cells, region: Region, seen: Array) -> _Cut:
     """The cut of a region that removes the most variance of its cells' luminance [C, N]."""
     inside = region.holds(cells.centre)
-    centre, area, values = cells.centre[inside], cells.area[inside], seen[inside]
-    best = None
+    centre, area = cells.centre[inside], cells.area[inside]
+    light = seen[inside] * area[:, None]
+    best = _Cut()
     for axis in range(3):
         positions = np.unique(np.round(centre[:, axis], 6))
-        for place in 0.5 * (positions[1:] + positions[:-1]):
-            first = centre[:, axis] < place
-            a, b = area[first], area[~first]
-            step = np.average(values[first], 0, a) - np.average(values[~first], 0, b)
-            gain = a.sum() * b.sum() / area.sum() * float(step @ step)
+        places = 0.5 * (positions[1:] + positions[:-1])
+        first = (centre[:, axis] < places[:, None]).astype(float)
+        a, b = first @ area, (1.0 - first) @ area
+        steps = (first @ light) / a[:, None] - ((1.0 - first) @ light) / b[:, None]
+        gains = a * b / area.sum() * np.einsum("cn,cn->c", steps, steps)
+        for gain, place in zip(gains, places, strict=True):
             gain = float(f"{gain:.6g}")  # equal ones stay so, whatever the order of summation
-            if best is None or gain > best[0]:
-                best = (gain, region, axis, float(place))
+            if gain > best.gain:
+                best = _Cut(gain, axis, float(place))
     return best

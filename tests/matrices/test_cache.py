@@ -130,6 +130,45 @@ def test_small_files_go_after_larger_ones(cache):
     assert sum(file.stat().st_size for file in cache.folder.iterdir()) <= small.limit
 
 
+def test_the_folder_is_listed_seldom_and_keeps_its_limit(cache, monkeypatch):
+    """As large as a 64th of the limit, or as forty files."""
+    trims, trim = [], MatrixCache.trim
+    monkeypatch.setattr(MatrixCache, "trim", lambda *of, **options: (trims.append(1), trim(*of, **options)))
+    cache.folder.mkdir()
+    left = cache.folder / ".cfs-01234567.part.npz"
+    left.touch()  # of a killed process
+    first = cache.entry("m", 0, by=BY)
+    first.save(STATE)
+    assert len(trims) == 1 and not left.exists()  # another process may have written much
+    size = first.path.stat().st_size
+    small = replace(cache, limit=64 * 40 * size)
+    most = 0
+    for number in range(1, 3000):
+        small.entry("m", number, by=BY).save(STATE)
+        most = max(most, number % 100 == 0 and sum(file.stat().st_size for file in cache.folder.iterdir()))
+    assert small.limit < most <= small.limit + 41 * size
+    assert 70 <= len(trims) <= 80
+
+
+def test_all_rooms_of_a_process_share_what_was_hashed(monkeypatch, tmp_path):
+    monkeypatch.setenv("CFS_CACHE", str(tmp_path))
+    assert MatrixCache.of_user().hashes is MatrixCache.of_user().hashes
+    monkeypatch.setenv("CFS_CACHE", str(tmp_path / "other"))
+    assert MatrixCache.of_user().folder == tmp_path / "other"
+
+
+def test_a_matrix_without_batches_is_computed_once(cache):
+    entry, calls = cache.entry("m", 1, by=BY), []
+
+    def compute():
+        calls.append(1)
+        return np.arange(6.0).reshape(2, 3)
+
+    first, second = (cache_module.cached_or_computed(entry, compute) for _ in range(2))
+    assert np.array_equal(first, second) and len(calls) == 1
+    assert np.array_equal(cache_module.cached_or_computed(None, compute), first) and len(calls) == 2
+
+
 def test_zeros_take_little_space(cache):
     cells, dense = np.zeros((132, 145, 146), dtype=np.float32), np.linspace(0.1, 0.9, 10_000)
     cells[::40, ::7] = 0.25

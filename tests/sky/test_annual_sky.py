@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.sparse import csr_array
 
 from mitsuba_cfs.sky.annual import AnnualSky, annual_sky, given_sky, hour_numbers
 from mitsuba_cfs.sky.weather import Weather
@@ -45,7 +46,13 @@ def test_parts_without_the_sun_and_the_whole_year(sky):
 def test_the_sun_alone_for_the_methods_is_made_once(sky):
     alone = sky.lit_sun
     assert (alone.toarray() if hasattr(alone, "toarray") else alone).tolist() == sky.sun.tolist()
-    assert sky.lit_sun is alone
+    assert sky.lit_sun is alone is sky.lit_sun_in(np.arange(3))
+    for lit in (sky.sun, csr_array(sky.sun.T)):
+        some = replace(sky)
+        some._lit_sun.append(lit)
+        part = some.lit_sun_in(np.array([2, 0]))
+        dense = part.toarray().T if isinstance(part, csr_array) else part
+        assert type(part) is type(lit) and dense.tolist() == sky.sun[:, [2, 0]].tolist()
     assert sky.sun_alone().tolist() == sky.sun.tolist()
     assert sky.sun_alone([2]).tolist() == [[3], [0]]
     bare = replace(sky, sun=None)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, accumulate, blocks, joined
+from mitsuba_cfs.matrices.cache import BatchMean, CacheEntry
+from mitsuba_cfs.trace.kernels.estimate import IN_CACHE, Estimate, Stopping, _with_another, accumulate, blocks, joined
 
 HOURS = 200
 
@@ -52,6 +55,44 @@ def test_blocks_cover_an_axis_of_any_length() -> None:
     for size in (0, 1, 3, 8, 9, 145):
         starts, sizes = blocks(size)
         assert sizes.sum() == size and (sizes > 0).all() and len(starts) == len(sizes) <= 8
+
+
+@pytest.mark.parametrize("shape", [(3, IN_CACHE // 7), (2, 5, 3000), (7,), (0, 12), (4, 0)])
+def test_batches_give_their_mean_its_error_and_the_covariance_of_blocks(shape: tuple[int, ...]) -> None:
+    random = np.random.default_rng(3)
+    batches = [random.uniform(size=shape) for _ in range(5)]
+    found = accumulate(lambda number: batches[number], stopping=Stopping(5))
+    several = np.array(batches)
+    np.testing.assert_allclose(found.values, several.mean(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(found.standard_error, several.std(axis=0, ddof=1) / 5**0.5, rtol=1e-6)
+    sums = np.add.reduceat(several - several.mean(axis=0), blocks(shape[-1])[0], axis=-1)
+    covariance = np.einsum("n...r,n...s->...rs", sums, sums) / 20
+    np.testing.assert_allclose(found.covariance, covariance, rtol=1e-9, atol=1e-12)
+
+
+def test_a_state_stays_as_it_was_when_batches_follow() -> None:
+    states: list[BatchMean] = []
+
+    class Entry:
+        def load(self) -> None:
+            return None
+
+        def save(self, state: BatchMean) -> None:
+            states.append(state)
+
+    def batch(number: int) -> NDArray[np.float64]:
+        if number == 3:
+            raise KeyboardInterrupt
+        return np.full((2, 3), float(number**2))
+
+    with pytest.raises(KeyboardInterrupt):
+        accumulate(batch, entry=cast(CacheEntry, Entry()))
+    (state,) = states
+    assert state.count == 3 and np.allclose(state.mean, 5 / 3) and np.allclose(state.spread, 26 / 3)
+    arrays = state.mean, state.spread, state.covariance
+    before = [one.copy() for one in arrays]
+    _with_another(np.full((2, 3), 9.0), *arrays, 3)
+    assert all(map(np.array_equal, before, arrays))
 
 
 def estimate(seed: int, common: float, rows: int | None = None) -> Estimate:

@@ -270,6 +270,16 @@ def test_cells_of_a_screen_have_its_light():
     assert np.abs(found - expected).mean() < 0.001 * expected.mean()
 
 
+def test_the_cells_of_batches_are_averaged():
+    from mitsuba_cfs.trace.matrices.daylight import _mean
+
+    sums = [np.random.default_rng(seed).uniform(size=(5000, 7)) for seed in range(3)]
+    share = np.linspace(0.1, 0.9, 5000)
+    mean = _mean(sums, share)
+    assert mean.dtype == np.float32
+    np.testing.assert_allclose(mean, np.mean(sums, axis=0) * share[:, None], rtol=1e-6)
+
+
 def test_a_sensor_sees_the_outdoors_through_a_screen():
     from mitsuba_cfs.trace.kernels.path_options import PathOptions
     from mitsuba_cfs.trace.kernels.scattering import KlemsScattering

@@ -207,6 +207,30 @@ def test_a_window_that_sees_nothing_is_cut_without_a_warning(parts):
     assert len(subdivided(dark, parts).regions) == (parts or 1)
 
 
+def test_the_best_cut_removes_the_most_variance():
+    from mitsuba_cfs.methods.subdivision import _best_cut
+
+    cells = window_cells(l_shape())
+    seen = np.random.default_rng(2).uniform(size=(len(cells.area), 5)) + np.sin(cells.centre[:, [1]])
+    region = Region.everything().halves(0, 0.8)[0]
+    inside = region.holds(cells.centre)
+
+    def variance(some):
+        mean = np.average(seen[some], axis=0, weights=cells.area[some])
+        return float((cells.area[some, None] * (seen[some] - mean) ** 2).sum())
+
+    gains = {}
+    for axis in range(3):
+        for place in np.unique(np.round(cells.centre[inside, axis], 6))[1:] - 1e-3:
+            halves = [inside & half.holds(cells.centre) for half in region.halves(axis, place)]
+            gains[axis, float(place)] = variance(inside) - sum(map(variance, halves))
+    found, (axis, place) = _best_cut(cells, region, seen), max(gains, key=lambda key: gains[key])
+    assert found.gain == pytest.approx(gains[axis, place], rel=1e-5) and found.axis == axis
+    cut = [half.holds(cells.centre).tolist() for half in region.halves(axis, found.place)]
+    assert cut == [half.holds(cells.centre).tolist() for half in region.halves(axis, place)]
+    assert _best_cut(cells, Region(np.full(3, 9.0), np.full(3, 10.0)), seen).gain < 0
+
+
 def test_states_of_a_cut_group_go_together():
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.methods.scene import Sampling

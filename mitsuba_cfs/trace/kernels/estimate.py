@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -18,6 +18,7 @@ from mitsuba_cfs.matrices.cache import BatchMean, CacheEntry, MatrixCache
 from mitsuba_cfs.progress import Progress, silent
 
 BLOCKS = 8  # of the last axis, whose sums have a covariance
+IN_CACHE = 1 << 14  # entries of an array
 LEAST_BATCHES = 4  # before an error is believed
 SAVE_SECONDS = 1.0  # a killed run loses this much work, or the batch under way if that is longer
 SAVE_SHARE = 20.0  # ... or so many times what saving takes
@@ -284,25 +285,46 @@ class _Keeper:
 def _with_another(
     values: NDArray[np.float64], mean: Any, spread: Any, covariance: Any, count: int
 ) -> tuple[Any, Any, Any]:
-    """Mean, sum of squares about it, and that of products of the blocks, with one more batch."""
-    starts, _ = blocks(values.shape[-1])
+    """Mean, sum of squares about it, and that of products of the blocks, with one more batch.
+
+    They are other arrays than those before: a state that was given out stays as it is.
+    """
+    shape, count_of_rows, size = values.shape, math.prod(values.shape[:-1]), values.shape[-1]
+    starts, _ = blocks(size)
+    of_blocks = (*shape[:-1], len(starts), len(starts))
     if not count:  # about itself the first has none
-        shape = (*values.shape[:-1], len(starts), len(starts))
-        return np.array(values), np.zeros_like(values), np.zeros(shape)
-    step = values - mean
-    mean = mean + step / (count + 1)
-    left = values - mean
-    of_blocks = [np.add.reduceat(one, starts, axis=-1) for one in (step, left)]
-    covariance = covariance + of_blocks[0][..., :, None] * of_blocks[1][..., None, :]
-    left *= step  # the states given out hold other arrays
-    left += spread
-    return mean, left, covariance
+        return np.array(values), np.zeros(shape, values.dtype), np.zeros(of_blocks)
+    kind = np.result_type(values, mean)
+    results = np.empty(shape, kind), np.empty(shape, kind), np.empty(of_blocks)
+    rows = [one.reshape(count_of_rows, size) for one in (values, mean, spread, *results[:2])]
+    rows_of_blocks = [one.reshape(count_of_rows, *of_blocks[-2:]) for one in (covariance, results[2])]
+    for some in row_slices(count_of_rows, size):
+        batch, old_mean, old_spread, new_mean, new_spread = (one[some] for one in rows)
+        old, new = (one[some] for one in rows_of_blocks)
+        step = batch - old_mean
+        np.add(old_mean, step / (count + 1), out=new_mean)
+        left = batch - new_mean
+        first, second = (np.add.reduceat(one, starts, axis=-1) for one in (step, left))
+        np.add(old, first[:, :, None] * second[:, None, :], out=new)
+        left *= step
+        np.add(left, old_spread, out=new_spread)
+    return results
+
+
+def row_slices(count: int, size: int) -> Iterator[slice]:
+    """Slices of rows of so many entries, few enough that several arrays of them fit the processor's cache."""
+    rows = max(IN_CACHE // max(size, 1), 1)
+    for first in range(0, count, rows):
+        yield slice(first, first + rows)
 
 
 def estimate_of(state: BatchMean) -> Estimate:
     """Mean and standard error of the batches so far."""
     pairs = (state.count - 1) * state.count
-    error = np.sqrt(np.maximum(state.spread.astype(float), 0) / pairs)
+    error = state.spread.astype(float)
+    np.maximum(error, 0, out=error)
+    error /= pairs
+    np.sqrt(error, out=error)
     return Estimate(state.mean, error, state.covariance / pairs, state.count, state.seconds)
 
 

@@ -7,6 +7,7 @@ Cells of a window have daylight matrices from few paths that all of them share.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -22,10 +23,10 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
-from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping
+from mitsuba_cfs.trace.kernels.estimate import Estimate, Stopping, row_slices
 from mitsuba_cfs.trace.kernels.path_options import PathOptions
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts, roulette
-from mitsuba_cfs.trace.kernels.rooms import TracedRoom, of_rooms
+from mitsuba_cfs.trace.kernels.rooms import TracedRoom, batches_of_rooms, of_rooms
 from mitsuba_cfs.trace.kernels.sampling import (
     Ranges,
     batch_key,
@@ -48,7 +49,7 @@ def cells_of_rooms(
     outdoors: SharedOutdoors | None,
     cells: Sequence[Sequence[Cells]],
     paths: Sequence[PathOptions],
-) -> list[list[NDArray[np.float64]]]:
+) -> list[list[NDArray[np.float32]]]:
     """Daylight matrices [C, K, P] of the cells of each window group, as `daylight_matrix`, of rooms traced together.
 
     Every cell sends out the same directions with the same random numbers: what two cells see alike
@@ -67,7 +68,7 @@ def cells_of_rooms(
         for room, place, of in zip(rooms, places, paths, strict=True)
     ]
 
-    def traced(some: Sequence[int]) -> Callable[[int], NDArray[np.float64]]:
+    def traced(some: Sequence[int]) -> NDArray[np.float32]:
         if outdoors is None:
             tracer = scenes.scene(rooms[0].surfaces, rooms[0].groups)
         else:
@@ -78,29 +79,41 @@ def cells_of_rooms(
         frames, corner, *sides = joined
         tables = [vectors(v) for v in (corner - tracer.centre, *sides)]
         axes = [vectors(frames[:, i]) for i in range(3)]
-        return _batches(tracer, bins, sky, tables, axes, counts=counts, samples=samples, max_depth=max_depth, seed=seed)
+        batch = _batches(
+            tracer, bins, sky, tables, axes, counts=counts, samples=samples, max_depth=max_depth, seed=seed
+        )
+        return _mean([batch(number) for number in range(BATCHES)], np.repeat(1.0 / samples, counts * bins.size))
 
     stored = (None if entry is None else entry.read(_stored) for entry in entries)
     values = [one for one in stored if one is not None]
     if len(values) < len(rooms):
-        estimates = of_rooms(
-            rooms,
-            traced,
-            [None] * len(rooms),
-            shapes=[(len(place[0]), bins.size, sky.size) for place in places],
-            stopping=Stopping(batches=BATCHES),
-            label="cell daylight",
-            outdoors=True,
-        )
-        # their noise is a thousand times the rounding of seven digits, and nobody reads it
-        values = [one.values.astype(np.float32) for one in estimates]
+        shapes = [(len(place[0]), bins.size, sky.size) for place in places]
+        of_room: dict[int, NDArray[np.float32]] = {}
+        for some in batches_of_rooms(rooms, list(map(math.prod, shapes)), outdoors=True):
+            ends = np.cumsum([math.prod(shapes[i][:-1]) for i in some])
+            for i, one in zip(some, np.split(traced(some), ends[:-1]), strict=True):
+                of_room[i] = one.reshape(shapes[i])
+        values = [of_room[i] for i in range(len(rooms))]
         for entry, one in zip(entries, values, strict=True):
             if entry is not None:
                 entry.write({"cells": one})
-    return [
-        np.split(one.astype(float), np.cumsum([len(c.area) for c in of])[:-1])
-        for one, of in zip(values, cells, strict=True)
-    ]
+    pairs = zip(values, cells, strict=True)
+    return [np.split(one, np.cumsum([len(c.area) for c in of])[:-1]) for one, of in pairs]
+
+
+def _mean(sums: Sequence[NDArray[np.float64]], share: NDArray[np.float64]) -> NDArray[np.float32]:
+    """The mean of batches of which each row is a share [n] of its sums [n, P].
+
+    In single precision: their noise is a thousand times the rounding of seven digits.
+    """
+    mean = np.empty(sums[0].shape, dtype=np.float32)
+    for some in row_slices(*mean.shape):
+        weight = share[some, None]
+        result = sums[0][some] * weight
+        for count, of_batch in enumerate(sums[1:], 2):
+            result += (of_batch[some] * weight - result) / count
+        mean[some] = result
+    return mean
 
 
 def _stored(data: Mapping[str, NDArray[np.float32]]) -> NDArray[np.float32]:
@@ -119,13 +132,12 @@ def _batches(
     max_depth: int,
     seed: int,
 ) -> Callable[[int], NDArray[np.float64]]:
-    """Batches of the matrices of the cells of some rooms [C * K, P].
+    """Batches of the sums over the paths of each patch of the cells of some rooms [C * K, P].
 
     Args: counts, samples: cells of each room, and paths of each of their patches.
     """
     K, lanes = bins.size, Ranges(counts * bins.size * samples)
     each, first = (column(v, mi.UInt32) for v in (samples, np.cumsum(counts) - counts))
-    share = np.repeat(1.0 / samples, counts * K)[:, None]
 
     def batch(number: int) -> NDArray[np.float64]:
         matrix = empty_sums(counts.sum() * K * sky.size)
@@ -150,7 +162,7 @@ def _batches(
             mi.Bool(True),
         )
         add_daylight_paths(tracer.of_lanes(room), sky, matrix, starts)
-        return sums_of(matrix, (counts.sum() * K, sky.size)) * share
+        return sums_of(matrix, (counts.sum() * K, sky.size))
 
     return batch
 
