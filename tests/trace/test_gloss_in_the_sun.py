@@ -62,6 +62,46 @@ def test_a_mirror_behind_the_windows_sends_them_no_sun():
         assert len(specular_sun_paths(TracedScene(there, groups, windows_block=False))) == ways
 
 
+def windows_in_layers(normal: np.ndarray) -> np.ndarray:
+    """Panes [T, 3, 3] with a normal in three layers, one of them with panes 3 cm apart in depth."""
+    random = np.random.default_rng(8)
+    x = np.cross(normal, [0.0, 0.0, 1.0])
+    x /= np.linalg.norm(x)
+    y, panes = np.cross(normal, x), []
+    for depth in (-6.0, -5.97, 0.0, 9.0):
+        for u, v in random.uniform(-20, 20, (6, 2)):
+            corner = depth * normal + u * x + v * y
+            panes.append(rooms.quad(corner, corner + x, corner + x + 1.5 * y, corner + 1.5 * y))
+    return np.concatenate(panes)
+
+
+def test_no_ray_that_meets_a_mirror_passes_by_its_map():
+    import mitsuba as mi
+
+    from mitsuba_cfs.trace.kernels.sampling import vectors
+    from mitsuba_cfs.trace.kernels.scene import scene_of
+    from mitsuba_cfs.trace.sun.mirror_map import MirrorMaps
+
+    normal = np.array([0.6, 0.7, 0.2])
+    normal /= np.linalg.norm(normal)
+    panes, random = windows_in_layers(normal), np.random.default_rng(9)
+    start, way = random.uniform(-25, 25, (200_000, 3)), random.normal(size=(200_000, 3))
+    way[::4] -= (way[::4] @ normal)[:, None] * normal * 0.998  # nearly along the panes
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    shares = random.dirichlet(np.full(3, 0.3), 100_000)
+    aims = np.einsum("ij,ijk->ik", shares, panes[random.integers(0, len(panes), 100_000)])
+    start[::2] = aims - 5 * way[::2]
+    ray = mi.Ray3f(vectors(start, mi.Point3f), vectors(way))
+    meets = scene_of(panes).ray_test(ray).numpy()
+    others = rooms.quad((0, 0, 0), (1, 0, 0), (1, 0, 1), (0, 0, 1))
+    maps = MirrorMaps([others.reshape(-1, 3), panes.reshape(-1, 3)], np.stack([[0.0, 1.0, 0.0], normal]))
+    plane = mi.UInt32(np.ones(len(way), dtype=np.uint32))
+    may = maps.may_meet(ray.o, ray.d, plane, mi.Bool(True), mi.Float(1e-4)).numpy()
+    assert meets[::4].mean() > 0.8 and not (meets & ~may).any()
+    steep = np.abs(way @ normal) > 0.05
+    assert (may & ~meets)[steep & (np.arange(len(way)) % 2 > 0)].mean() < 0.02
+
+
 @pytest.mark.slow
 def test_five_phases_have_the_sun_of_a_mirror_facade():
     """E in a room behind clear glass by five phases against paths, an even sky and the sun."""

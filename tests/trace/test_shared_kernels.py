@@ -118,8 +118,8 @@ def test_a_scene_is_found_again_whether_its_centre_is_said_or_not() -> None:
     assert cache.scene(interior, groups, centre=found.centre + 1e-3) is not found
 
 
-def test_sun_by_many_mirrors_has_a_kernel_for_each_number_of_mirrors():
-    """One kernel of all paths would take OptiX minutes to compile."""
+def test_sun_by_mirrors_has_one_kernel_for_all_paths():
+    """It follows one mirror after the other; with all of them in its code OptiX would compile it for minutes."""
     import drjit as dr
 
     from mitsuba_cfs.gloss import mirror
@@ -146,4 +146,4 @@ def test_sun_by_many_mirrors_has_a_kernel_for_each_number_of_mirrors():
     assert len(paths) > 2 * len(lengths) > 4
     tracing = {k["hash"] for k in kernels if k["operation_count"] > 200}
     assert len(kernels) >= len(paths)
-    assert len(tracing) <= len(lengths), [k["operation_count"] for k in kernels]
+    assert len(tracing) <= 2, [k["operation_count"] for k in kernels]

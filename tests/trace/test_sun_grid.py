@@ -120,3 +120,28 @@ def test_mirrors_send_on_as_much_sun_as_by_rays_to_each():
     off = (grid - rays).reshape(16, 32, -1).sum(axis=(1, 2)) / mirrored.sum() * 16
     error = off.std(ddof=1) / 4
     assert abs(off.mean()) < 4 * error < 0.03
+
+
+@pytest.mark.parametrize("each", [8, 32])
+def test_pairs_whose_nodes_are_alike_have_rays_where_they_are_checked_or_level(each: int):
+    from mitsuba_cfs.trace.sun.lit_points import SunGrid, SurfacePoints, _GridLight
+    from mitsuba_cfs.trace.sun.specular_paths import SPREAD, SpecularPath
+
+    random = np.random.default_rng(2)
+    suns = suns_of_a_year()
+    level = np.array([suns[100, 1], -suns[100, 0], 0.0])
+    normals = random.choice([[0.0, 0, 1], [0, -1, 0], [0.6, 0.8, 0], level / np.linalg.norm(level)], 60)
+    places = SurfacePoints(np.zeros((60, 3), dtype=np.float32), normals.astype(np.float32))
+    grid, number = SunGrid.about(suns), random.integers(0, 90, 60)
+    rows = np.sort(random.choice(60, 40, replace=False))
+    outside = outdoors(rooms.NOTHING)
+    light = _GridLight(outside, [SpecularPath(outside)] * 2, grid, places, number)
+    light._each[1] = each
+    found = light._pairs_with_rays(1, rows) - 60 * len(suns)
+    cosine = places.normal.astype(float) @ suns.T
+    checked = (number[:, None] + grid.first) % each == 0
+    own = (np.abs(cosine) <= SPREAD) | ((cosine > 0) & checked)
+    own[np.setdiff1d(np.arange(60), rows)] = False
+    assert own[:, 100].any() and len(np.unique(found)) == len(found)
+    assert not np.setdiff1d(np.flatnonzero(own), found).size
+    assert len(found) < 1.01 * np.count_nonzero(own)

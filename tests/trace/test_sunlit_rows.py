@@ -11,19 +11,20 @@ from scipy import sparse
 import mitsuba_cfs as cfs
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.images.view import pixel_directions
-from mitsuba_cfs.surfaces import WindowGroup, WindowSurface
+from mitsuba_cfs.surfaces import Surfaces, WindowGroup, WindowSurface
 from mitsuba_cfs.trace.kernels.pixel_rows import MOST_TIMES, PictureRows, tile_size
 from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
+from mitsuba_cfs.trace.sun.even_points import EvenPoints
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints
 from mitsuba_cfs.trace.sun.picture_sun import PictureSun
+from mitsuba_cfs.trace.sun.sorting import joint_keys, order_of
 from mitsuba_cfs.trace.sun.sunlit_cells import RoomCells, surface_cells
 from mitsuba_cfs.trace.sun.sunlit_rows import (
     FACE_STEPS,
     EdgePoints,
     _beside,
     _Hits,
-    _order,
     _pieces,
     picture_sunlit_shares,
     window_sunlit_shares,
@@ -188,8 +189,43 @@ def test_elements_are_numbered_in_the_order_of_their_cubes() -> None:
     np.testing.assert_array_equal(cubes, expected.T)
     np.testing.assert_array_equal(element, numbers.ravel())
     np.testing.assert_array_equal(order, np.argsort(numbers.ravel(), kind="stable"))
+
+
+def test_order_of_numbers_and_of_columns() -> None:
+    random = np.random.default_rng(3)
+    columns = random.integers([[-4], [0], [70_000]], [[5], [3], [70_009]], (3, 900))
+    keys = joint_keys(columns)
+    order = order_of(keys)
+    np.testing.assert_array_equal(order, np.lexsort(columns[::-1]))
+    np.testing.assert_array_equal(np.diff(keys[order]) > 0, np.diff(columns[:, order]).any(axis=0))
     wide = np.array([2**62, 3, 2**62, 0])  # no room for the places beside the numbers
-    np.testing.assert_array_equal(_order(wide), [3, 1, 0, 2])
+    np.testing.assert_array_equal(order_of(wide), [3, 1, 0, 2])
+    assert not len(order_of(joint_keys(columns[:, :0])))
+
+
+def test_points_lie_evenly_on_both_sides_of_the_surfaces() -> None:
+    """Against areas; a triangle without area has no point."""
+    random = np.random.default_rng(5)
+    triangles = random.uniform(-2.0, 3.0, (7, 3, 3))
+    triangles[3, 2] = triangles[3, 1]
+    surfaces = Surfaces(triangles, np.full(7, 0.5), np.arange(7))
+    centre, off, count = np.array([1.0, 2.0, 3.0]), 0.01, 5000
+    points = EvenPoints(surfaces, centre, off, count)
+    every = points.some(np.arange(2 * count))
+    for axis in range(3):
+        np.testing.assert_array_equal(np.concatenate(points.along(axis)), every.point[:, axis])
+    np.testing.assert_array_equal(every.normal[:count], -every.normal[count:])
+    np.testing.assert_allclose(np.linalg.norm(every.normal, axis=1), 1, rtol=1e-6)
+    first, second = every.point[:count], every.point[count:]
+    np.testing.assert_allclose(first - second, 2 * off * every.normal[:count], atol=1e-5)
+    number = points.repeated(np.arange(7))
+    np.testing.assert_allclose(np.bincount(number, minlength=7), surfaces.areas / surfaces.areas.sum() * count, atol=1)
+    middle = 0.5 * (first + second).astype(float)
+    for t in (0, 1, 2, 4, 5, 6):
+        corner, *sides = triangles[t] - centre
+        shares = (middle[number == t] - corner) @ np.linalg.pinv(np.array(sides) - corner)
+        assert shares.min() > -1e-4 and shares.sum(axis=1).max() < 1 + 1e-4
+        np.testing.assert_allclose(shares.mean(axis=0), 1 / 3, atol=0.03)
 
 
 def test_grazing_sun_lights_a_picture_by_its_flux() -> None:

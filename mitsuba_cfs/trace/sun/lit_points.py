@@ -40,13 +40,15 @@ from numpy.typing import NDArray
 from mitsuba_cfs.sky.sun import SUN_RADIUS
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, path_generator, tables, vectors
 from mitsuba_cfs.trace.kernels.scene import TracedScene
-from mitsuba_cfs.trace.sun.specular_paths import SPREAD, SpecularPath, specular_sun_paths
+from mitsuba_cfs.trace.sun.specular_paths import SPREAD, SpecularPath, SpecularPaths, specular_sun_paths
 
 BOUNCES = 5  # surfaces that a path meets at most
 ROULETTE = 0.5  # share of light below which paths are thinned out
 STEP = float(np.radians(4.0))  # between nodes, about the zenith
 CHECKED = 8  # of places whose nodes agree, one in so many has a ray to the sun itself
 MIRRORED = 32  # the same of the sun in a mirror, which few places have
+ROUNDING = 1e-5  # of a cosine in a kernel beside NumPy's, at most
+LANES = 2**22  # rays to nodes at once
 KEY = 2**32  # of a node's number along one axis, to hold both
 
 
@@ -212,18 +214,10 @@ def sunlight(outside: TracedScene, places: SurfacePoints, suns: NDArray[np.float
         turned = way.apparent(suns)
         point, normal, to_sun = points_and_suns(places, turned)
         middle = column((places.normal @ turned.T).ravel())
-        light += _shone(way, point, normal, to_sun, middle)
+        slant = dr.dot(normal, to_sun)
+        light += _shone(way.transmittance(mi.Ray3f(point, to_sun), slant > 0), middle, slant)
         dr.eval(light)  # one kernel for all paths by as many mirrors
     return light.numpy().reshape(places.size, len(suns))
-
-
-def sunlight_of_pairs(
-    way: SpecularPath, places: SurfacePoints, suns: NDArray[np.float64], pair: mi.UInt32, number: mi.UInt32
-) -> mi.Float:
-    """The same of some pairs by one specular path; suns: [h, 3] apparent directions."""
-    point, normal, to_sun = points_and_suns(places, suns, pair, number)
-    middle = dr.gather(mi.Vector3f, vectors(suns), pair % dr.opaque(mi.UInt32, len(suns)))
-    return _shone(way, point, normal, to_sun, dr.dot(normal, middle))
 
 
 def sunlight_of_each(outside: TracedScene, places: SurfacePoints, suns: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -233,22 +227,21 @@ def sunlight_of_each(outside: TracedScene, places: SurfacePoints, suns: NDArray[
         turned = way.apparent(suns)
         to_sun = on_disc_of(vectors(turned), number)
         middle = column((places.normal * turned).sum(axis=1))
-        light += _shone(way, places.points(), places.normals(), to_sun, middle)
+        slant = dr.dot(places.normals(), to_sun)
+        light += _shone(way.transmittance(mi.Ray3f(places.points(), to_sun), slant > 0), middle, slant)
         dr.eval(light)
     return light.numpy()
 
 
-def _shone(
-    way: SpecularPath, point: mi.Point3f, normal: mi.Vector3f, to_sun: mi.Vector3f, middle: mi.Float
-) -> mi.Float:
+def _shone(share: mi.Float, middle: mi.Float, slant: mi.Float) -> mi.Float:
     """Cosine times transmittance of a direction on the sun's disc; 0 where it is hidden.
 
-    Args: middle: cosine of the disc's centre, which is the disc's mean where all of it is above the
-        point's horizon, without the noise of one direction.
+    Args:
+        middle: cosine of the disc's centre, which is the disc's mean where all of it is above the
+            point's horizon, without the noise of one direction.
+        slant: that of the direction.
     """
-    slant = dr.dot(normal, to_sun)
     cosine = dr.select(middle > SUN_RADIUS, middle, slant)
-    share = way.transmittance(mi.Ray3f(point, to_sun), slant > 0)
     return dr.select(cosine > 0, cosine * share, 0.0)
 
 
@@ -282,39 +275,179 @@ class SunGrid:
         mixed = (bits @ np.array([0x9E3779B1, 0x85EBCA77, 0xC2B2AE3D], dtype=np.uint64)) >> 12
         return cls(suns, nodes, corner.reshape(-1, 3), weight, mixed.astype(np.int64) % MIRRORED)
 
-    def light(self, way: SpecularPath, places: SurfacePoints, number: mi.UInt32) -> mi.Float:
-        """Irradiance of points by a specular path per unit normal to the suns [m * h].
 
-        Args: number: [m] as of `sunlight_of_many`.
+class _GridLight:
+    """Irradiance of places [m] per unit normal to the suns [h] of a grid by specular paths [N].
+
+    Several paths share a launch.  A pair is a path, a place and a sun, numbered in this order, and a
+    row a path and a place.
+    """
+
+    def __init__(
+        self,
+        outside: TracedScene,
+        paths: Sequence[SpecularPath],
+        grid: SunGrid,
+        places: SurfacePoints,
+        number: NDArray[np.int64],
+    ) -> None:
+        """Upload what the launches share; number: [m] as of `sunlight_of_many`."""
+        self._grid, self._number = grid, number
+        self._shape = len(paths), places.size, len(grid.suns)
+        self._ways = SpecularPaths(outside, [path.planes for path in paths])
+        self._suns = np.concatenate([path.apparent(grid.suns) for path in paths])
+        self._towards = vectors(self._suns)
+        self._nodes = vectors(np.concatenate([path.apparent(grid.nodes) for path in paths]))
+        self._each = np.array([MIRRORED if path.mirrors else CHECKED for path in paths])
+        self._points, self._normals = places.points(), places.normals()
+        self._drawn, self._first = column(number, mi.UInt32), column(grid.first, mi.UInt32)
+        self._mirrored = column([path.mirrors for path in paths], mi.Bool)
+        self._corners = [(column(c, mi.UInt32), column(w)) for c, w in zip(grid.corner.T, grid.weight.T, strict=True)]
+        self._kinds, kind_of = np.unique(places.normal, axis=0, return_inverse=True)
+        self._kind_of = kind_of.reshape(-1)
+
+    def whole(self) -> NDArray[np.float32]:
+        """The light by all paths together [m, h]."""
+        N, m, h = self._shape
+        total = np.zeros((m, h), dtype=np.float32)
+        step = max(1, LANES // max(m * len(self._grid.nodes), 1))
+        for start in range(0, N, step):
+            self._add(total, range(start, min(start + step, N)))
+        return total
+
+    def _add(self, total: NDArray[np.float32], paths: range) -> None:
+        """Add the light by some paths, one after the other."""
+        _, m, h = self._shape
+        at = self._at_nodes(paths)
+        reached = at.numpy().reshape(len(paths), m, -1).any(axis=2)
+        reached[2 * np.count_nonzero(reached, axis=1) > m] = True  # all of them take no longer than most
+        rows = np.flatnonzero(reached) + paths.start * m
+        light, own, differ = self._between_nodes(at, rows, paths.start)
+        lane = np.flatnonzero(own)
+        pair = rows[lane // h] * h + lane % h
+        alike = [self._pairs_with_rays(path, np.flatnonzero(~one)) for path, one in zip(paths, reached, strict=True)]
+        others = np.concatenate(alike)
+        before = np.append(light[lane], np.zeros(len(others), dtype=np.float32))
+        unlike = np.append(differ[lane], np.zeros(len(others), dtype=bool))
+        exact = self._by_rays(np.append(pair, others), unlike, before)
+        light[lane], exact = exact[: len(lane)], exact[len(lane) :]
+        light, flat = light.reshape(len(rows), h), total.reshape(-1)
+        for path, one, pairs in zip(paths, reached, alike, strict=True):
+            count = np.count_nonzero(one)
+            total[slice(None) if count == m else one] += light[:count]
+            flat[pairs - path * m * h] += exact[: len(pairs)]
+            light, exact = light[count:], exact[len(pairs) :]
+
+    def _at_nodes(self, paths: range) -> mi.Float:
+        """Transmittance of the rows of some paths to the nodes [r * n]."""
+        _, m, _ = self._shape
+        nodes = dr.opaque(mi.UInt32, len(self._grid.nodes))
+        lane = dr.arange(mi.UInt32, len(paths) * m * len(self._grid.nodes))
+        row = lane // nodes
+        path, place = self._path_and_rest(row + dr.opaque(mi.UInt32, paths.start * m), m)
+        towards = dr.gather(mi.Vector3f, self._nodes, path * nodes + lane - row * nodes)
+        to_node = on_disc_of(towards, dr.gather(mi.UInt32, self._drawn, place))
+        ray = mi.Ray3f(dr.gather(mi.Point3f, self._points, place), to_node)
+        facing = dr.dot(dr.gather(mi.Vector3f, self._normals, place), to_node) > 0
+        return self._ways.transmittance(ray, path, facing)
+
+    @staticmethod
+    def _path_and_rest(number: mi.UInt32, size: int) -> tuple[mi.UInt32, mi.UInt32]:
+        count = dr.opaque(mi.UInt32, size)
+        path = number // count
+        return path, number - path * count
+
+    def _between_nodes(
+        self, at: mi.Float, rows: NDArray[np.int64], start: int
+    ) -> tuple[NDArray[np.float32], NDArray[np.bool_], NDArray[np.bool_]]:
+        """Light of some rows by what the nodes about each sun have [r * h].
+
+        And which pairs get a ray of their own, and whose nodes differ.
+
+        Args: at: of the rows of all places from the path `start` on.
         """
-        nodes, suns = way.apparent(self.nodes), way.apparent(self.suns)
-        point, normal, to_node = points_and_suns(places, nodes, number=number)
-        at = way.transmittance(mi.Ray3f(point, to_node), dr.dot(normal, to_node) > 0)
-        dr.eval(at)
-        count = dr.opaque(mi.UInt32, len(suns))
-        place = dr.arange(mi.UInt32, places.size * len(suns))
-        place, hour = place // count, place % count
-        each = MIRRORED if way.mirrors else CHECKED
-        start, share, lit = place * dr.opaque(mi.UInt32, len(nodes)), mi.Float(0), mi.UInt32(0)
-        for corner, weight in zip(self.corner.T, self.weight.T, strict=True):
-            node = dr.gather(mi.UInt32, column(corner, mi.UInt32), hour)
-            value = dr.gather(mi.Float, at, start + node)
-            share += dr.gather(mi.Float, column(weight), hour) * value
+        if not len(rows):
+            return np.empty(0, dtype=np.float32), np.empty(0, dtype=bool), np.empty(0, dtype=bool)
+        _, m, h = self._shape
+        lane = dr.arange(mi.UInt32, len(rows) * h)
+        number, hour = self._path_and_rest(lane, h)
+        row = dr.gather(mi.UInt32, column(rows, mi.UInt32), number)
+        path, place = self._path_and_rest(row, m)
+        begin = (row - dr.opaque(mi.UInt32, start * m)) * dr.opaque(mi.UInt32, len(self._grid.nodes))
+        share, lit = mi.Float(0), mi.UInt32(0)
+        for corner, weight in self._corners:
+            value = dr.gather(mi.Float, at, begin + dr.gather(mi.UInt32, corner, hour))
+            share += dr.gather(mi.Float, weight, hour) * value
             lit += dr.select(value > 0, mi.UInt32(1), mi.UInt32(0))
-        cosine = dr.dot(dr.gather(mi.Vector3f, places.normals(), place), dr.gather(mi.Vector3f, vectors(suns), hour))
+        towards = dr.gather(mi.Vector3f, self._towards, path * dr.opaque(mi.UInt32, h) + hour)
+        cosine = dr.dot(dr.gather(mi.Vector3f, self._normals, place), towards)
         differ, level = (lit > 0) & (lit < 3), dr.abs(cosine) <= SPREAD
-        first = dr.gather(mi.UInt32, column(self.first, mi.UInt32), hour)
-        checked = (dr.gather(mi.UInt32, number, place) + first) % each == 0
-        own = level | ((cosine > 0) & (differ | checked))
-        light = dr.select((cosine > 0) & ~level, cosine * share, 0.0)
-        times = dr.select(differ | level, mi.Float(1), mi.Float(each))
-        dr.eval(light, own, times)
-        pair = dr.compress(own)
-        if dr.width(pair):
-            before, more = (dr.gather(mi.Float, of, pair) for of in (light, times))
-            exact = sunlight_of_pairs(way, places, suns, pair, number)
-            dr.scatter(light, before + more * (exact - before), pair)
-        return light
+        own = self._has_ray((path, place, hour), cosine, differ)
+        light, own, differ = tables(dr.select((cosine > 0) & ~level, cosine * share, 0.0), own, differ)
+        return light, own, differ
+
+    def _has_ray(self, pair: tuple[mi.UInt32, mi.UInt32, mi.UInt32], cosine: mi.Float, differ: mi.Bool) -> mi.Bool:
+        """Whether pairs get a ray of their own: level with the sun, their nodes unlike, or checked."""
+        path, place, hour = pair
+        drawn, first = dr.gather(mi.UInt32, self._drawn, place), dr.gather(mi.UInt32, self._first, hour)
+        number, mirrored = drawn + first, dr.gather(mi.Bool, self._mirrored, path)
+        checked = dr.select(mirrored, number % MIRRORED == 0, number % CHECKED == 0)
+        return (dr.abs(cosine) <= SPREAD) | ((cosine > 0) & (differ | checked))
+
+    def _pairs_with_rays(self, path: int, places: NDArray[np.int64]) -> NDArray[np.int64]:
+        """Numbers of the pairs of a path and some places that have a ray though their nodes are alike.
+
+        And a few others.
+        """
+        (_, m, h), each = self._shape, self._each[path]
+        first, rows = self._grid.first % each, path * m + places
+        cosine = self._kinds.astype(float) @ self._suns[path * h : (path + 1) * h].T
+        reach = SPREAD + ROUNDING
+        before, level = cosine >= -reach, np.abs(cosine) <= reach
+        number, kind = -self._number[places] % each, self._kind_of[places]
+        order = np.argsort(first.astype(np.uint8), kind="stable")
+        row, hour = _listed(np.bincount(first, minlength=each), order, number)
+        facing = before[kind[row], hour]
+        checked = rows[row[facing]] * h + hour[facing]
+        row, hour = _listed(np.count_nonzero(level, axis=1), np.nonzero(level)[1], kind)
+        other = first[hour] != number[row]
+        return np.concatenate([checked, rows[row[other]] * h + hour[other]])
+
+    def _by_rays(
+        self, pair: NDArray[np.int64], differ: NDArray[np.bool_], before: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """Light of some pairs [k] by rays, from that by the nodes; 0 of those that have no ray."""
+        if not len(pair):
+            return before
+        _, m, h = self._shape
+        unlike, light = column(differ, mi.Bool), column(before)
+        row, hour = self._path_and_rest(column(pair, mi.UInt32), h)
+        path, place = self._path_and_rest(row, m)
+        towards = dr.gather(mi.Vector3f, self._towards, path * dr.opaque(mi.UInt32, h) + hour)
+        point, normal = (dr.gather(type(a), a, place) for a in (self._points, self._normals))
+        middle = dr.dot(normal, towards)
+        has_ray = self._has_ray((path, place, hour), middle, unlike)
+        to_sun = on_disc_of(towards, dr.gather(mi.UInt32, self._drawn, place))
+        slant = dr.dot(normal, to_sun)
+        share = self._ways.transmittance(mi.Ray3f(point, to_sun), path, has_ray & (slant > 0))
+        exact = _shone(share, middle, slant)
+        each = dr.select(dr.gather(mi.Bool, self._mirrored, path), mi.Float(MIRRORED), mi.Float(CHECKED))
+        more = dr.select(unlike | (dr.abs(middle) <= SPREAD), mi.Float(1), each)
+        found: NDArray[np.float32] = dr.select(has_ray, light + more * (exact - light), 0.0).numpy()
+        return found
+
+
+def _listed(
+    sizes: NDArray[np.int64], entries: NDArray[np.int64], number: NDArray[np.int64]
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The entries of some lists [n], by the lists' numbers: the place of each entry's number in [n], and the entry.
+
+    Args: sizes: of all lists; entries: of one list after the other.
+    """
+    counts = sizes[number]
+    which, ends = np.repeat(np.arange(len(number)), counts), np.cumsum(counts)
+    shift = (np.cumsum(sizes) - sizes)[number] - (ends - counts)
+    return which, entries[np.arange(len(which)) + shift[which]]
 
 
 def sunlight_of_many(
@@ -325,7 +458,5 @@ def sunlight_of_many(
     Args: number: [m] of each point among those of its sum, by default of all points: a point has
         the light that it has with these alone.
     """
-    grid = SunGrid.about(suns)
-    drawn = column(np.arange(places.size) if number is None else number, mi.UInt32)
-    light = sum(grid.light(way, places, drawn) for way in specular_sun_paths(outside))
-    return light.numpy().reshape(places.size, len(suns))
+    number = np.arange(places.size) if number is None else number
+    return _GridLight(outside, specular_sun_paths(outside), SunGrid.about(suns), places, number).whole()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import drjit as dr
@@ -14,6 +15,7 @@ from mitsuba_cfs.surfaces import triangle_areas
 from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, opaque_vector, vectors
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
+from mitsuba_cfs.trace.sun.mirror_map import MirrorMaps
 
 SPREAD = float(1.01 * SUN_RADIUS)  # of directions on the disc about its middle, at most
 BEFORE = 1e-3  # [m] in front of a window's plane, where a mirror must be to send it light
@@ -32,6 +34,7 @@ class SpecularPath:
         """The path by smooth mirror planes of the scene, from the receiver on; none: direct."""
         self._outside, self.planes = outside, planes
         self.free = not planes and not outside.surface_count  # no obstacle outdoors
+        self._alone = SpecularPaths(outside, [planes]) if planes else None
 
     @property
     def mirrors(self) -> bool:
@@ -54,31 +57,71 @@ class SpecularPath:
 
     def transmittance(self, ray: mi.Ray3f, active: mi.Bool, *, coherent: bool = False) -> mi.Float:
         """Transmittance of rays from points outdoors to the apparent sun; 0 where it is hidden."""
-        outside = self._outside
-        if not self.planes:
-            hidden = outside.hides(ray, active, coherent=coherent)
+        if self._alone is None:
+            hidden = self._outside.hides(ray, active, coherent=coherent)
             return dr.select(active & ~hidden, mi.Float(1), mi.Float(0))
-        gloss, tau = outside.gloss, mi.Float(1)
-        for plane in self.planes:
-            active &= self._may_meet(ray, plane)
-            hit = outside.scene.ray_intersect_preliminary(ray, coherent=coherent, active=active)
-            active &= hit.is_valid()
-            active &= gloss.plane_of(hit.prim_index, active) == opaque(plane, mi.Int32)
-            normal = opaque_vector(gloss.normals[plane])
-            normal = dr.mulsign(normal, -dr.dot(normal, ray.d))
-            cosine = -dr.dot(normal, ray.d)
-            tau *= gloss.specular(hit.prim_index, cosine, active)
-            position = mi.Point3f(ray.o + ray.d * hit.t + normal * outside.epsilon)
-            ray = mi.Ray3f(position, mi.Vector3f(ray.d + normal * (2 * cosine)))
-        active &= ~outside.hides(ray, active, coherent=coherent)
-        return dr.select(active, tau, 0.0)
+        return self._alone.transmittance(ray, opaque(0, mi.UInt32), active, coherent=coherent)
 
-    def _may_meet(self, ray: mi.Ray3f, plane: int) -> mi.Bool:
-        """Whether rays meet the bounding box of a plane's mirrors."""
-        corners = self._outside.gloss.corners[plane] - self._outside.centre
-        box = corners.min(axis=0), corners.max(axis=0)
-        start, margin = mi.Vector3f(ray.o), CLEAR * self._outside.epsilon
-        return meets_box(start, ray.d, box, margin)
+
+class SpecularPaths:
+    """Several specular paths, for launches in which each ray follows one of them."""
+
+    def __init__(self, outside: TracedScene, planes: Sequence[tuple[int, ...]]) -> None:
+        """By the mirror planes of each path [N]."""
+        self._outside = outside
+        self._maps = outside.derived(_mirror_maps) if any(planes) else None
+        table = np.zeros((len(planes), MOST_MIRRORS), dtype=np.uint32)
+        for row, numbers in zip(table, planes, strict=True):
+            row[: len(numbers)] = numbers
+        self._planes = column(table.ravel(), mi.UInt32)
+        self._length = column([len(numbers) for numbers in planes], mi.UInt32)
+
+    def transmittance(self, ray: mi.Ray3f, path: mi.UInt32, active: mi.Bool, *, coherent: bool = False) -> mi.Float:
+        """Transmittance of rays from points outdoors to the apparent sun; 0 where it is hidden.
+
+        Args: path: number of each ray's path.
+        """
+        tau = mi.Float(1)
+        if self._maps is not None:
+            ray, tau, active = self._by_mirrors(ray, path, active, coherent)
+        return dr.select(active & ~self._outside.hides(ray, active, coherent=coherent), tau, 0.0)
+
+    @dr.syntax
+    def _by_mirrors(
+        self, ray: mi.Ray3f, path: mi.UInt32, active: mi.Bool, coherent: bool
+    ) -> tuple[mi.Ray3f, mi.Float, mi.Bool]:
+        """Rays behind the mirrors of their paths, what these reflect, and which rays met them all."""
+        outside, gloss = self._outside, self._outside.gloss
+        position, way, tau = mi.Point3f(ray.o), mi.Vector3f(ray.d), mi.Float(1)
+        met, length = mi.UInt32(0), dr.gather(mi.UInt32, self._length, path, active)
+        done = active & (length == 0)
+        near = self._is_near(position, way, path, met, active & (length > 0))
+        while near:  # few rays come close to a mirror
+            plane = self._plane(path, met, near)
+            hit = outside.scene.ray_intersect_preliminary(mi.Ray3f(position, way), coherent=coherent, active=near)
+            near &= hit.is_valid()
+            near &= gloss.plane_of(hit.prim_index, near) == mi.Int32(plane)
+            normal, _ = gloss.plane(plane)
+            normal = dr.mulsign(normal, -dr.dot(normal, way))
+            cosine = -dr.dot(normal, way)
+            tau *= gloss.specular(hit.prim_index, cosine, near)
+            position = mi.Point3f(position + way * hit.t + normal * outside.epsilon)
+            way = mi.Vector3f(way + normal * (2 * cosine))
+            met += 1
+            done |= near & (met == length)
+            near = self._is_near(position, way, path, met, near & (met < length))
+        return mi.Ray3f(position, way), tau, done
+
+    def _plane(self, path: mi.UInt32, met: mi.UInt32, active: mi.Bool) -> mi.UInt32:
+        """The plane of the next mirror."""
+        return dr.gather(mi.UInt32, self._planes, path * MOST_MIRRORS + met, active)
+
+    def _is_near(
+        self, position: mi.Point3f, way: mi.Vector3f, path: mi.UInt32, met: mi.UInt32, active: mi.Bool
+    ) -> mi.Bool:
+        """Whether rays may meet the next mirror."""
+        slack = CLEAR * self._outside.epsilon
+        return self._maps.may_meet(position, way, self._plane(path, met, active), active, slack)
 
 
 def meets_box(
@@ -100,12 +143,22 @@ def meets_box(
 
 def specular_sun_paths(outside: TracedScene) -> list[SpecularPath]:
     """All specular paths: direct, by each mirror plane that a window sees, by several mirrors."""
-    mirrors = [] if outside.gloss is None else [int(p) for p in outside.gloss.mirrors]
-    return [
-        SpecularPath(outside),
-        *(SpecularPath(outside, (p,)) for p in mirrors if _seen(outside, p)),
-        *(SpecularPath(outside, planes) for planes in mirror_sequences(outside)),
-    ]
+    return [SpecularPath(outside, planes) for planes in outside.derived(_paths_of_planes)]
+
+
+def _paths_of_planes(outside: TracedScene) -> list[tuple[int, ...]]:
+    """The mirror planes of each specular path."""
+    return [(), *((p,) for p in _mirrors(outside) if _seen(outside, p)), *mirror_sequences(outside)]
+
+
+def _mirrors(outside: TracedScene) -> list[int]:
+    return [] if outside.gloss is None else [int(p) for p in outside.gloss.mirrors]
+
+
+def _mirror_maps(outside: TracedScene) -> MirrorMaps:
+    """Where the mirrors of each plane are."""
+    gloss = outside.gloss
+    return MirrorMaps([corners - outside.centre for corners in gloss.corners], gloss.normals)
 
 
 def mirror_sequences(outside: TracedScene) -> list[tuple[int, ...]]:
@@ -114,7 +167,7 @@ def mirror_sequences(outside: TracedScene) -> list[tuple[int, ...]]:
     A plane holds all mirrors of one orientation and gloss, so that it follows itself where two
     facades face each other.  At most `MOST_SEQUENCES`, those between the largest mirrors first.
     """
-    mirrors = [] if outside.gloss is None else [int(p) for p in outside.gloss.mirrors]
+    mirrors = _mirrors(outside)
     facing = {(a, b): _mutual_area(outside, a, b) for a in mirrors for b in mirrors}
     sequences: list[tuple[int, ...]] = []
     ends = [(p,) for p in mirrors if _seen(outside, p)]

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import drjit as dr
 import mitsuba as mi
@@ -24,11 +24,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, opaque_vector, pixel_positions, vectors
+from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, opaque_vector, vectors
 from mitsuba_cfs.trace.kernels.scattering import Scattering
 from mitsuba_cfs.trace.kernels.scene import TracedScene
+from mitsuba_cfs.trace.sun.even_points import EvenPoints
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_faces, on_disc_of
+from mitsuba_cfs.trace.sun.sorting import joint_keys, order_of
 from mitsuba_cfs.trace.sun.specular_paths import SPREAD, SpecularPath, beam_transmittance, specular_sun_paths
 
 CELLS = 4096  # that the surfaces' area is divided into, about, on either side
@@ -41,6 +42,7 @@ FACING = 1.49  # of a normal, before its parts are rounded to -1, 0 or 1
 # distance along the normal replaces the coordinate of the normal's main axis, in steps this much
 # smaller.  The weights decide between axes that a slanted normal has equal parts of
 THIN, MAIN = 16, (1.0, 1.01, 1.02)
+SIDE_NUMBERS = np.array([1, 3, 9], dtype=np.int32)  # of the parts of a normal, -1, 0 or 1, in the number of a side
 SHIFT = 5.5 / THIN  # of the first cube before the surfaces, which lie in the middle of a thin one
 RAYS = 2**21  # at once
 
@@ -109,9 +111,14 @@ class CellPoints:
     """Points even over a room's surfaces, on both sides, in the order of their cells."""
 
     cells: RoomCells
-    places: SurfacePoints
     first: NDArray[np.int64]  # [c] number of each cell's first point
     count: NDArray[np.int64]  # [c]
+    points: EvenPoints | None  # None where the surfaces have no area
+    order: NDArray[np.int64]  # number of each among `points`
+
+    def some(self, number: NDArray[np.int64]) -> SurfacePoints:
+        """Some of the points, by number in the order of the cells."""
+        return SurfacePoints.joined([] if self.points is None else [self.points.some(self.order[number])])
 
 
 def surface_cells(inside: TracedScene) -> CellPoints:
@@ -123,22 +130,41 @@ def _surface_cells(inside: TracedScene) -> CellPoints:
     interior = inside.surfaces
     none, area = np.empty(0, dtype=np.int64), float(interior.areas.sum())
     if not area > 0:
-        cells = RoomCells(1.0, np.zeros(3), 0, none, np.empty(0))
-        return CellPoints(cells, SurfacePoints.joined([]), none, none)
+        return CellPoints(RoomCells(1.0, np.zeros(3), 0, none, np.empty(0)), none, none, None, none)
     edge = float(np.sqrt(max(area, 1e-6) / CELLS))
     low = (interior.triangles.min(axis=(0, 1)) - inside.centre) - SHIFT * edge
-    points, side = _points_on(interior, inside)
-    place, every = (points.point - low) / edge, np.arange(points.size)
-    main = np.argmax(np.abs(points.normal) * np.array(MAIN), axis=1)
-    along = (place * points.normal).sum(axis=1) * THIN
-    place[every, main] = np.copysign(1, points.normal[every, main]) * along
-    cube = np.floor(place).astype(np.int64) & 0xFFFF
-    keys = ((cube[:, 0] << 37) | (cube[:, 1] << 21) | (cube[:, 2] << 5)) + side
-    order = np.argsort(keys, kind="stable")
-    unique, first = np.unique(keys[order], return_index=True)
-    count = np.diff(np.append(first, len(order)))
-    cells = RoomCells(edge, low, 0, unique, count * (area / AREA_POINTS))
-    return CellPoints(cells, points.some(order), first, count)
+    points = EvenPoints(interior, inside.centre, inside.epsilon[0], AREA_POINTS)
+    cubes = _cubes_and_sides(points, low, edge)
+    keys = joint_keys(cubes)
+    order = order_of(keys)
+    keys = keys[order]
+    first = np.flatnonzero(np.diff(keys, prepend=-1))
+    count = np.diff(first, append=len(order))
+    x, y, z, side = cubes[:, order[first]].astype(np.int64)
+    cells = RoomCells(edge, low, 0, ((x << 37) | (y << 21) | (z << 5)) + side, count * (area / AREA_POINTS))
+    return CellPoints(cells, first, count, points, order)
+
+
+def _cubes_and_sides(points: EvenPoints, low: NDArray[np.float64], edge: float) -> NDArray[np.int32]:
+    """The cube of each point, in the coordinates of `RoomCells`, and the number of its side [4, n]."""
+    halves = np.empty((4, len(points.normals), points.count), dtype=np.int32)
+    along = [points.along(axis) for axis in range(3)]
+    for i, normal in enumerate(points.normals):
+        places = [coordinate[i] - low[axis] for axis, coordinate in enumerate(along)]
+        main = np.argmax(np.abs(normal) * np.array(MAIN), axis=1)
+        onwards = np.zeros(points.count)
+        for axis, place in enumerate(places):
+            place /= edge
+            part = points.repeated(normal[:, axis].astype(float))
+            part *= place
+            onwards += part
+        onwards *= points.repeated(np.copysign(THIN, normal[np.arange(len(main)), main]))
+        for axis, place in enumerate(places):
+            np.copyto(place, onwards, where=points.repeated(main == axis))
+            halves[axis, i] = np.floor(place, out=place)
+        halves[3, i] = points.repeated((np.round(FACING * normal).astype(np.int32) + 1) @ SIDE_NUMBERS)
+    halves[:3] &= 0xFFFF
+    return halves.reshape(4, -1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,25 +214,36 @@ class OpenBeam:
         self, by: SpecularPath, cells: RoomCells, suns: NDArray[np.float64], columns: NDArray[np.int64]
     ) -> sparse.csr_array:
         """Some of the columns of the flux, the others empty."""
-        count = len(self.seeds) * len(suns)
-        value, position, to_sun = self._entering(by, suns, columns, self.fewer)
+        value = self._entering(by, suns, columns, self.fewer)
         lit = value > 0
         crossed = lit.any(axis=1) & ~lit.all(axis=1)
         value[crossed] = 0
-        flux = self._landed(cells, value, position, to_sun, columns, count)
+        flux = self._landed(by, cells, suns, columns, value)
         some = columns[crossed]
         step = max(RAYS // self.points, 1)
         for start in range(0, len(some), step):
             part = some[start : start + step]
-            flux = flux + self._landed(cells, *self._entering(by, suns, part, self.points), part, count)
+            flux = flux + self._landed(by, cells, suns, part, self._entering(by, suns, part, self.points))
         return flux
 
     def _entering(
         self, by: SpecularPath, suns: NDArray[np.float64], columns: NDArray[np.int64], points: int
-    ) -> tuple[NDArray[np.float32], mi.Point3f, mi.Vector3f]:
-        """Flux of rays through points of the windows [n, points], the points and ways out."""
+    ) -> NDArray[np.float32]:
+        """Flux of rays through points of the windows [n, points], for some of the columns [n]."""
         inside = self.scenes[0]
         lane = dr.arange(mi.UInt32, points * len(columns))
+        position, to_sun = self._rays(by, suns, columns, points, lane)
+        local = inside.to_group(self.group, to_sun)
+        start = mi.Point3f(position + inside.outward(opaque(self.group, mi.Int32), mi.Bool(True)))
+        reaching = by.transmittance(mi.Ray3f(start, to_sun), local.z > 0)
+        value = dr.select(local.z > 0, local.z * reaching, 0.0)
+        value *= opaque(inside.groups[self.group].area / points)
+        return value.numpy().reshape(len(columns), points)
+
+    def _rays(
+        self, by: SpecularPath, suns: NDArray[np.float64], columns: NDArray[np.int64], points: int, lane: mi.UInt32
+    ) -> tuple[mi.Point3f, mi.Vector3f]:
+        """Points on the windows and ways out of rays, numbered by column and point."""
         row = lane // dr.opaque(mi.UInt32, points)
         point = lane - row * dr.opaque(mi.UInt32, points)
         # the same points in all hours: an hour's light does not depend on those computed with it
@@ -214,36 +251,32 @@ class OpenBeam:
         keys = np.array([seed & 0xFFFFFFFF for seed in self.seeds], dtype=np.uint32)[batch]
         key = dr.gather(mi.UInt32, column(keys, mi.UInt32), row)
         stream = mi.sample_tea_32(opaque(self.group, mi.UInt32), key)[0]
-        position = inside.sample_group(self.group, lattice_2d(point, stream, 0))
-        to_sun = on_disc_of(dr.gather(mi.Vector3f, vectors(by.apparent(suns)[hour]), row), point)
-        local = inside.to_group(self.group, to_sun)
-        start = mi.Point3f(position + inside.outward(opaque(self.group, mi.Int32), mi.Bool(True)))
-        reaching = by.transmittance(mi.Ray3f(start, to_sun), local.z > 0)
-        value = dr.select(local.z > 0, local.z * reaching, 0.0)
-        value *= opaque(inside.groups[self.group].area / points)
-        return value.numpy().reshape(len(columns), points), position, to_sun
+        position = self.scenes[0].sample_group(self.group, lattice_2d(point, stream, 0))
+        return position, on_disc_of(dr.gather(mi.Vector3f, vectors(by.apparent(suns)[hour]), row), point)
 
     def _landed(
         self,
+        by: SpecularPath,
         cells: RoomCells,
-        value: NDArray[np.float32],
-        position: mi.Point3f,
-        to_sun: mi.Vector3f,
+        suns: NDArray[np.float64],
         columns: NDArray[np.int64],
-        count: int,
+        value: NDArray[np.float32],
     ) -> sparse.csr_array:
-        """Flux on the cells [c, count] by rays [n, points] of some of the columns [n]."""
-        inside, flat = self.scenes[0], value.ravel()
+        """Flux on the cells [c, B * h] by the rays of some of the columns, with a flux each [n, points]."""
+        shape, flat, points = (cells.size, len(self.seeds) * len(suns)), value.ravel(), value.shape[1]
+        lit = np.flatnonzero(flat > 0)  # the sun reaches few of the points by way of mirrors
+        if not len(lit):
+            return sparse.csr_array(shape)
+        inside = self.scenes[0]
+        position, to_sun = self._rays(by, suns, columns, points, column(lit, mi.UInt32))
         off = inside.outward(opaque(self.group, mi.Int32), mi.Bool(True))
         origin, onwards = mi.Point3f(position - off), mi.Vector3f(-to_sun)
-        ray, lit = mi.Ray3f(origin, onwards), column(flat > 0, mi.Bool)
-        hit = inside.scene.ray_intersect_preliminary(ray, coherent=False, active=lit)
-        lit &= hit.is_valid()
-        cell = cells.of(*hit_faces(inside, origin, onwards, hit, lit), lit).numpy()
-        kept = np.flatnonzero(cell >= 0)
-        cell = cell[kept]
-        entries = flat[kept].astype(float), (cell, columns[kept // value.shape[1]])
-        return sparse.csr_array(sparse.coo_array(entries, shape=(cells.size, count)))
+        hit = inside.scene.ray_intersect_preliminary(mi.Ray3f(origin, onwards), coherent=False)
+        met = hit.is_valid()
+        cell = cells.of(*hit_faces(inside, origin, onwards, hit, met), met).numpy()
+        lit, cell = lit[cell >= 0], cell[cell >= 0]
+        entries = flat[lit].astype(float), (cell, columns[lit // points])
+        return sparse.csr_array(sparse.coo_array(entries, shape=shape))
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,29 +307,3 @@ def transmitted(flux: Sequence[sparse.csr_array], tau: NDArray[np.float32]) -> s
             times = np.tile(by_hour.astype(float), one.shape[1] // max(len(by_hour), 1))
             whole = whole + one @ sparse.diags_array(times)
     return sparse.csr_array(whole)
-
-
-@cache
-def _shares_of_corners() -> tuple[NDArray[np.float64], ...]:
-    """What points even over a triangle have of its corners, `AREA_POINTS` in turn."""
-    u, v = pixel_positions(AREA_POINTS).T[:, :, None]
-    root = np.sqrt(u)
-    return 1 - root, root * (1 - v), root * v
-
-
-def _points_on(interior: Surfaces, inside: TracedScene) -> tuple[SurfacePoints, NDArray[np.int64]]:
-    """Points even over the area of the surfaces, on both of their sides; numbers of the sides."""
-    share = np.cumsum(interior.areas)
-    marks = (np.arange(AREA_POINTS) + 0.5) / AREA_POINTS * share[-1]
-    triangle = np.minimum(np.searchsorted(share, marks), len(share) - 1)
-    corners = interior.triangles.swapaxes(0, 1)
-    parts = zip(corners - inside.centre, _shares_of_corners(), strict=True)
-    point = sum(corner.take(triangle, axis=0) * part for corner, part in parts)
-    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-    off = (inside.epsilon[0] * normal).take(triangle, axis=0)
-    both = np.concatenate([normal, -normal]).astype(np.float32)
-    side = (np.round(FACING * both).astype(np.int64) + 1) @ np.array([1, 3, 9])
-    of = np.concatenate([triangle, len(share) + triangle])
-    points = np.concatenate([point + off, point - off]).astype(np.float32)
-    return SurfacePoints(points, both.take(of, axis=0)), side[of]

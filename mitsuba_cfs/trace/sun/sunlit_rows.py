@@ -38,6 +38,7 @@ from mitsuba_cfs.trace.kernels.sampling import column, lattice_2d, opaque, strea
 from mitsuba_cfs.trace.kernels.scene import TracedScene
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
 from mitsuba_cfs.trace.sun.lit_points import SurfacePoints, hit_points, reflecting_points
+from mitsuba_cfs.trace.sun.sorting import joint_keys, order_of
 from mitsuba_cfs.trace.sun.sunlit_cells import RoomCells, surface_cells
 
 PIECES = 1024  # that the surfaces' area would be divided into by pieces of the widest edge
@@ -407,24 +408,15 @@ def _pieces(hits: _Hits, edge: float) -> tuple[NDArray[np.int64], NDArray[np.int
         table[axis] = np.floor(np.ascontiguousarray(places.point[:, axis]) * each)
         table[3 + axis] = np.round(places.normal[:, axis] * FACE_STEPS)
     table[6] = hits.halvings
-    kind = _keys(table[3:], table[3:])  # sides and sizes: numbered one by one, they are few
+    kind = joint_keys(table[3:])  # sides and sizes: numbered one by one, they are few
     kind = np.cumsum(np.bincount(kind) > 0)[kind]
     both = np.vstack([table[:3], kind], dtype=np.int32, casting="unsafe")
-    keys = _keys(both, both)
-    order = _order(keys)
+    keys = joint_keys(both)
+    order = order_of(keys)
     first = np.diff(keys[order], prepend=-1) > 0
     element = np.empty(len(keys), dtype=np.int64)
     element[order] = np.cumsum(first) - 1
     return element, order, table[:, order[first]].T.astype(np.int64)
-
-
-def _order(keys: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The order [n] of numbers of 0 or more, equal ones as they come."""
-    bits = len(keys).bit_length()
-    if keys.max(initial=0) >> (63 - bits):
-        return np.argsort(keys, kind="stable")
-    # by numbers that hold both, which NumPy sorts several times as fast as it finds an order
-    return np.sort((keys << bits) + np.arange(len(keys))) & ((1 << bits) - 1)
 
 
 def _keys(some: NDArray[np.int64], table: NDArray[np.int64]) -> NDArray[np.int64]:

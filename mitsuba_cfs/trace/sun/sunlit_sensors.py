@@ -67,7 +67,7 @@ def room_cells(inside: TracedScene, *, samples: int = CELL_RAYS * CELL_SHARE) ->
     share = (np.arange(rays) + 0.5) / rays
     chosen = (np.cumsum(number) - number)[:, None] + (number[:, None] * share).astype(np.int64)
     chosen = chosen.ravel()
-    return narrow, ReflectingCells(wide, holder, points.places.some(chosen + shift[chosen]))
+    return narrow, ReflectingCells(wide, holder, points.some(chosen + shift[chosen]))
 
 
 def shares_and_derivatives(
