@@ -45,7 +45,7 @@ def test_parts_without_the_sun_and_the_whole_year(sky):
 def test_the_sun_alone_for_the_methods_is_made_once(sky):
     alone = sky.lit_sun
     assert (alone.toarray() if hasattr(alone, "toarray") else alone).tolist() == sky.sun.tolist()
-    assert sky.lit_sun is alone
+    assert sky.lit_sun is alone and sky.lit_sun_in(np.arange(3)) is alone
     assert sky.sun_alone().tolist() == sky.sun.tolist()
     assert sky.sun_alone([2]).tolist() == [[3], [0]]
     bare = replace(sky, sun=None)
@@ -53,6 +53,16 @@ def test_the_sun_alone_for_the_methods_is_made_once(sky):
         with pytest.raises(ValueError, match="made without the sun alone"):
             made()
     assert [list(one) for one in bare.totals(np.ones(3, bool))] == [[21, 7], [0, 0], [0, 0]]
+
+
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_sun_in_some_hours_is_that_of_the_whole_sky(sky, dark):
+    wide = sky if not dark else replace(sky, whole=np.zeros((100, 3)), sun=np.eye(100)[:, [5, 7, 50]])
+    chosen = np.array([2, 0])
+    some = wide.lit_sun_in(chosen)
+    assert isinstance(some, np.ndarray) != dark
+    found = some.toarray().T if dark else some
+    assert found.tolist() == wide.sun_alone(chosen).tolist()
 
 
 def test_parts_by_number_or_mask_are_of_the_hours_alone(sky):

@@ -634,6 +634,10 @@ class SceneCache:
             self._scenes.popitem(last=False)
         return self._scenes[key][1]
 
+    def of_surfaces(self, surfaces: Surfaces, centre: ArrayLike) -> TracedScene:
+        """A scene of surfaces alone about a centre [3], which is not kept, unlike its mesh."""
+        return TracedScene(surfaces, centre=centre, mesh=self._mesh(surfaces.triangles))
+
     def together(self, rooms: Sequence[TracedRoom]) -> tuple[list[TracedRoom], TracedScene]:
         """Rooms moved apart from each other, and the scene of all of them."""
         if len(rooms) == 1:
