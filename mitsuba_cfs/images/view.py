@@ -155,7 +155,7 @@ def rays(view: View, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[Any], NDArray[
         directions /= np.sqrt(np.einsum("...k,...k->...", directions, directions))[..., None]
     exists = np.broadcast_to(exists, shape)
     if not exists.all():
-        directions[~exists] = 0.0
+        directions.reshape(-1, 3)[np.flatnonzero(~exists)] = 0.0  # faster than by a mask
     return directions, exists
 
 
@@ -166,8 +166,9 @@ def pixel_rays(
 
     Args: pixels: [...] row * width + column; across, down: [...] from their left, top corner, 0..1.
     """
-    x = (pixels % view.width + np.asarray(across, float)) / view.width
-    return rays(view, x, 1.0 - (pixels // view.width + np.asarray(down, float)) / view.height)
+    row = pixels // view.width
+    x = (pixels - row * view.width + np.asarray(across, float)) / view.width
+    return rays(view, x, 1.0 - (row + np.asarray(down, float)) / view.height)
 
 
 # Projections: coordinates x, y from the centre to the parts of the ray along right, up and forward,

@@ -154,14 +154,15 @@ def subdivided(light: CellLight, parts: int | None = None, *, limit: float = LIM
     bright = np.maximum(level(outside), DARK)
     seen = (outside * weight / bright).reshape(len(outside), -1)
     regions = light.regions
+    cuts: list[tuple[float, int, float]] = []  # the best of each region, as far as it has been needed
     most = min(MOST_PARTS if parts is None else parts, len(seen))
     while len(regions) < most and (parts is not None or judge.error(regions) > limit):
-        cuts = [cut for region in regions if (cut := _best_cut(light.cells, region, seen))]
-        if not cuts:
+        cuts += [_best_cut(light.cells, region, seen) for region in regions[len(cuts) :]]
+        best = max(range(len(cuts)), key=lambda number: cuts[number][0])
+        gain, axis, place = cuts.pop(best)
+        if not gain > -np.inf:
             break
-        _, region, axis, place = max(cuts, key=lambda cut: cut[0])
-        others = [r for r in regions if r is not region]
-        regions = (*others, *region.halves(axis, place))
+        regions = (*regions[:best], *regions[best + 1 :], *regions[best].halves(axis, place))
     return replace(light, regions=regions)
 
 
@@ -223,19 +224,23 @@ def level(luminance: Array) -> Array:
     return np.einsum("ckh,k->h", luminance, omega / np.pi)[None, None] / len(luminance)
 
 
-def _best_cut(cells: Cells, region: Region, seen: Array) -> tuple[float, Region, int, float] | None:
-    """The cut of a region that removes the most variance of its cells' luminance [C, N]."""
+def _best_cut(cells: Cells, region: Region, seen: Array) -> tuple[float, int, float]:
+    """The cut of a region that removes the most variance of its cells' luminance [C, N].
+
+    Returns: the variance removed, minus infinity where nothing can be cut; axis; place.
+    """
     inside = region.holds(cells.centre)
     centre, area, values = cells.centre[inside], cells.area[inside], seen[inside]
-    best = None
-    for axis in range(3):
-        positions = np.unique(np.round(centre[:, axis], 6))
-        for place in 0.5 * (positions[1:] + positions[:-1]):
-            first = centre[:, axis] < place
-            a, b = area[first], area[~first]
-            step = np.average(values[first], 0, a) - np.average(values[~first], 0, b)
-            gain = a.sum() * b.sum() / area.sum() * float(step @ step)
-            gain = float(f"{gain:.6g}")  # equal ones stay so, whatever the order of summation
-            if best is None or gain > best[0]:
-                best = (gain, region, axis, float(place))
-    return best
+    places = [np.unique(np.round(along, 6)) for along in centre.T]
+    cuts = [(axis, float(place)) for axis, at in enumerate(places) for place in 0.5 * (at[1:] + at[:-1])]
+    if not cuts:
+        return -np.inf, 0, 0.0
+    first = np.stack([centre[:, axis] < place for axis, place in cuts])  # [n, C]
+    sides = [np.where(side, area, 0.0) for side in (first, ~first)]
+    a, b = (side.sum(axis=1) for side in sides)
+    step = sides[0] @ values / a[:, None] - sides[1] @ values / b[:, None]
+    gains = a * b / area.sum() * np.einsum("nk,nk->n", step, step)
+    # equal ones stay so, whatever the order of summation
+    rounded = [float(f"{gain:.6g}") for gain in gains]
+    best = int(np.argmax(rounded))
+    return rounded[best], *cuts[best]

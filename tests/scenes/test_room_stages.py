@@ -105,3 +105,14 @@ def test_a_stage_that_is_run_twice_takes_the_sum_of_both(monkeypatch) -> None:
         with times.stage("glare"):
             pass
     assert times.seconds == {"glare": 3.5}
+
+
+def test_memory_is_returned_after_long_stages_alone(monkeypatch) -> None:
+    returned: list[int] = []
+    monkeypatch.setattr(page.variants, "return_memory", lambda: returned.append(1))
+    for seconds, times in ((page.LONG / 2, 0), (2 * page.LONG, 1)):
+        clock = iter([0.0, seconds])
+        monkeypatch.setattr(page.time, "monotonic", lambda clock=clock: next(clock))
+        with StageTimes().stage("glare"):
+            pass
+        assert len(returned) == times
