@@ -90,7 +90,7 @@ def test_rays_spread_over_pixels_are_those_of_each_place_in_them(monkeypatch, sa
     from mitsuba_cfs.images.view import fisheye, pixel_rays
     from mitsuba_cfs.trace.kernels import sampling
 
-    view = fisheye((0, 0, 1.2), (0.3, 1.0, 0.1), 20)
+    view = fisheye((0, 0, 1.2), (0.3, 1.0, 0.1), 20, kind="hemispherical")
     pixels = np.random.default_rng(2).integers(0, 400, 50)
     across, down = np.tile(sampling.pixel_positions(samples), (50, 1)).T
     expected = pixel_rays(view, np.repeat(pixels, samples), across, down)
