@@ -10,6 +10,7 @@ Source: Radiance `rpict` manual (view options) and the projection formulas of it
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -258,16 +259,25 @@ def pixel_solid_angles(view: View) -> NDArray[np.float64]:
 
     omega = (sum of the four angles between the planes through neighbouring sides) - 2 pi;
     0 where one of the corners has no ray (outer rim of a hemispherical picture).
+
+    Returns: not to be written to: it is that of all views of one projection.
     """
-    straight = replace(view, position=(0, 0, 0), direction=(0, 1, 0), up=(0, 0, 1))
+    return _pixel_solid_angles(replace(view, position=(0, 0, 0), direction=(0, 1, 0), up=(0, 0, 1), fore=0, aft=0))
+
+
+@lru_cache(maxsize=2)
+def _pixel_solid_angles(view: View) -> NDArray[np.float64]:
     x = np.arange(view.width + 1) / view.width
     y = np.arange(view.height + 1)[::-1] / view.height
     if view.shift or view.lift:
-        return _solid_angles(straight, x, y)
-    rows, columns = (view.height + 1) // 2, (view.width + 1) // 2
-    quarter = _solid_angles(straight, x[: columns + 1], y[: rows + 1])
-    left = np.concatenate([quarter, quarter[: view.height // 2][::-1]])
-    return np.concatenate([left, left[:, : view.width // 2][:, ::-1]], axis=1)
+        angles = _solid_angles(view, x, y)
+    else:
+        rows, columns = (view.height + 1) // 2, (view.width + 1) // 2
+        quarter = _solid_angles(view, x[: columns + 1], y[: rows + 1])
+        left = np.concatenate([quarter, quarter[: view.height // 2][::-1]])
+        angles = np.concatenate([left, left[:, : view.width // 2][:, ::-1]], axis=1)
+    angles.flags.writeable = False
+    return angles
 
 
 def _solid_angles(view: View, x: NDArray[Any], y: NDArray[Any]) -> NDArray[np.float64]:
