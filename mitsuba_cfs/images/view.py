@@ -131,11 +131,14 @@ def fitted(view: View, size: int) -> View:
     return replace(view, width=width, height=height)
 
 
+@lru_cache(maxsize=8)  # rays are computed some at a time
 def frame(view: View) -> NDArray[np.float64]:
-    """Rows right, up, forward [3, 3] of the picture in the world."""
+    """Rows right, up, forward [3, 3] of the picture in the world; not to be written to."""
     forward = np.asarray(view.direction)
     right = _unit(np.cross(forward, view.up), "direction across")
-    return np.stack([right, np.cross(right, forward), forward])
+    rows = np.stack([right, np.cross(right, forward), forward])
+    rows.flags.writeable = False
+    return rows
 
 
 def rays(view: View, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[Any], NDArray[Any]]:
