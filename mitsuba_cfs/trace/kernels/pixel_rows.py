@@ -40,7 +40,7 @@ def face_numbers(tracer: TracedScene) -> NDArray[np.int64]:
     steps = np.round(tables(tracer.normal)[0] * FACE_STEPS).astype(np.int64)
     number, width = tracer.surface.numpy().astype(np.int64), 2 * FACE_STEPS + 1
     for axis in steps.T:
-        number = number * width + axis + FACE_STEPS
+        number = number * width + axis
     return np.unique(number, return_inverse=True)[1].reshape(-1)
 
 
