@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,12 +77,12 @@ class _NearElements:
     def __init__(self, elements: Sequence[Element], space: Space) -> None:
         corners = space.shell.reshape(-1, 3)
         low, high = corners.min(axis=0) - DEEPEST_WALL, corners.max(axis=0) + DEEPEST_WALL
-        near = [
-            element
-            for element in elements
-            if np.all(element.triangles.min(axis=(0, 1)) <= high) and np.all(element.triangles.max(axis=(0, 1)) >= low)
-        ]
         none = np.empty((0, 3, 3))
+        every = np.concatenate([none, *(element.triangles for element in elements)])
+        first = np.cumsum([0, *(len(element.triangles) for element in elements)])[:-1]
+        lowest, highest = np.minimum.reduceat(every.min(axis=1), first), np.maximum.reduceat(every.max(axis=1), first)
+        is_near = (lowest <= high).all(axis=1) & (highest >= low).all(axis=1)
+        near = list(compress(elements, is_near))
         triangles = np.concatenate([none, *(element.triangles for element in near)])
         self.mesh = ray_mesh(triangles)
         self.normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])

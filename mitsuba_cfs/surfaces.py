@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -96,7 +97,7 @@ class SurfaceGroups:
             raise ValueError(f"number of a surface's group: expected -1 to {len(self.names) - 1}")
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class WindowSurface:
     """A plane glazed aperture; its normal points outdoors."""
 
@@ -121,12 +122,12 @@ class WindowSurface:
         object.__setattr__(self, "triangles", t)
         object.__setattr__(self, "normal", area_vector / length)
 
-    @property
+    @cached_property
     def area(self) -> float:
         """Glazed area [m2]."""
         return float(triangle_areas(self.triangles).sum())
 
-    @property
+    @cached_property
     def frame(self) -> NDArray[np.float64]:
         """Rows x, y, z [3, 3] of the window frame (see `mitsuba_cfs.directions`)."""
         return window_frame(self.normal, self.up)

@@ -10,6 +10,7 @@ Source: Radiance `rpict` manual (view options) and the projection formulas of it
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -130,11 +131,14 @@ def fitted(view: View, size: int) -> View:
     return replace(view, width=width, height=height)
 
 
+@lru_cache(maxsize=8)  # rays are computed some at a time
 def frame(view: View) -> NDArray[np.float64]:
-    """Rows right, up, forward [3, 3] of the picture in the world."""
+    """Rows right, up, forward [3, 3] of the picture in the world; not to be written to."""
     forward = np.asarray(view.direction)
     right = _unit(np.cross(forward, view.up), "direction across")
-    return np.stack([right, np.cross(right, forward), forward])
+    rows = np.stack([right, np.cross(right, forward), forward])
+    rows.flags.writeable = False
+    return rows
 
 
 def rays(view: View, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -155,7 +159,7 @@ def rays(view: View, x: ArrayLike, y: ArrayLike) -> tuple[NDArray[Any], NDArray[
         directions /= np.sqrt(np.einsum("...k,...k->...", directions, directions))[..., None]
     exists = np.broadcast_to(exists, shape)
     if not exists.all():
-        directions[~exists] = 0.0
+        directions.reshape(-1, 3)[np.flatnonzero(~exists)] = 0.0  # faster than by a mask
     return directions, exists
 
 
@@ -166,8 +170,9 @@ def pixel_rays(
 
     Args: pixels: [...] row * width + column; across, down: [...] from their left, top corner, 0..1.
     """
-    x = (pixels % view.width + np.asarray(across, float)) / view.width
-    return rays(view, x, 1.0 - (pixels // view.width + np.asarray(down, float)) / view.height)
+    row = pixels // view.width
+    x = (pixels - row * view.width + np.asarray(across, float)) / view.width
+    return rays(view, x, 1.0 - (row + np.asarray(down, float)) / view.height)
 
 
 # Projections: coordinates x, y from the centre to the parts of the ray along right, up and forward,
@@ -257,16 +262,25 @@ def pixel_solid_angles(view: View) -> NDArray[np.float64]:
 
     omega = (sum of the four angles between the planes through neighbouring sides) - 2 pi;
     0 where one of the corners has no ray (outer rim of a hemispherical picture).
+
+    Returns: not to be written to: it is that of all views of one projection.
     """
-    straight = replace(view, position=(0, 0, 0), direction=(0, 1, 0), up=(0, 0, 1))
+    return _pixel_solid_angles(replace(view, position=(0, 0, 0), direction=(0, 1, 0), up=(0, 0, 1), fore=0, aft=0))
+
+
+@lru_cache(maxsize=2)
+def _pixel_solid_angles(view: View) -> NDArray[np.float64]:
     x = np.arange(view.width + 1) / view.width
     y = np.arange(view.height + 1)[::-1] / view.height
     if view.shift or view.lift:
-        return _solid_angles(straight, x, y)
-    rows, columns = (view.height + 1) // 2, (view.width + 1) // 2
-    quarter = _solid_angles(straight, x[: columns + 1], y[: rows + 1])
-    left = np.concatenate([quarter, quarter[: view.height // 2][::-1]])
-    return np.concatenate([left, left[:, : view.width // 2][:, ::-1]], axis=1)
+        angles = _solid_angles(view, x, y)
+    else:
+        rows, columns = (view.height + 1) // 2, (view.width + 1) // 2
+        quarter = _solid_angles(view, x[: columns + 1], y[: rows + 1])
+        left = np.concatenate([quarter, quarter[: view.height // 2][::-1]])
+        angles = np.concatenate([left, left[:, : view.width // 2][:, ::-1]], axis=1)
+    angles.flags.writeable = False
+    return angles
 
 
 def _solid_angles(view: View, x: NDArray[Any], y: NDArray[Any]) -> NDArray[np.float64]:

@@ -78,6 +78,8 @@ from scenes.room.zone import (
 )
 from thermal.control import combinations_of, levels_of
 
+LONG = 2.0  # stages after which memory is returned; a shorter one has used little [s]
+
 
 class RoomChoices(TypedDict, total=False):
     """Options of `compute_room` and `lit_room`; see there."""
@@ -102,11 +104,13 @@ class StageTimes:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Add the duration of the block to a stage, and return memory that is no longer used."""
+        """Add the duration of the block to a stage, and return what memory a long one has left."""
         start = time.monotonic()
         yield
-        variants.return_memory()
-        self.add(name, time.monotonic() - start)
+        seconds = time.monotonic() - start
+        self.add(name, seconds)
+        if seconds > LONG:
+            variants.return_memory()
 
     def add(self, name: str, seconds: float) -> None:
         """Add a duration to a stage."""

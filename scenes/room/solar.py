@@ -299,6 +299,7 @@ def facade_irradiance(
             outer.normals,
             subdivision=scene.sampling.subdivision,
             progress=progress,
+            scenes=outdoors.first.scenes,
             **_sampled(outdoors.first),
         ).values  # [n, P] irradiance per unit radiance of each sky patch [sr]
         return coefficients.astype(sky.dtype) @ sky

@@ -23,6 +23,7 @@ from mitsuba_cfs.sky.weather import Weather
 from mitsuba_cfs.stored_arrays import StoredArrays
 from mitsuba_cfs.surfaces import Surfaces
 from mitsuba_cfs.trace.kernels.estimate import cache_entry
+from mitsuba_cfs.trace.kernels.scene import SceneCache
 from mitsuba_cfs.trace.matrices.view_factors import sky_shares
 from scenes.fenestration.thermal_system import ThermalSystem, thermal_system
 from scenes.results import DaylightResult, ShadingYear
@@ -490,6 +491,7 @@ def room_zone(
         list(zip(exteriors, shares, strict=True)),
         seed=room.options.sampling.seed,
         cache=room.cache,
+        scenes=outdoors.first.scenes,
     )
     shading = room.shading(state)
     if ruled is not None:
@@ -522,10 +524,13 @@ def with_sky_view(
     *,
     seed: int = 0,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> ThermalRoom:
     """The room with the view factors to the sky of its outer faces and windows.
 
-    Args: exteriors: surfaces outdoors, and the share of the year in which they are there.
+    Args:
+        exteriors: surfaces outdoors, and the share of the year in which they are there.
+        scenes: as of `sky_shares`.
     """
     points = np.concatenate([outer.points, outer.windows])
     normals = np.concatenate([outer.normals, outer.window_normals])
@@ -535,9 +540,11 @@ def with_sky_view(
     def sky_view(exterior: Surfaces) -> NDArray[np.float64]:
         inputs, by = (exterior.triangles, points, normals, SKY_SAMPLES, seed), sky_shares.__module__
         entry = cache_entry(cache, "sky shares", *inputs, by=by, stopping=None)
-        return cached_or_computed(
-            entry, lambda: sky_shares(exterior, points, normals, samples=SKY_SAMPLES, seed=seed)[:, None]
-        )[:, 0]
+
+        def traced() -> NDArray[np.float64]:
+            return sky_shares(exterior, points, normals, samples=SKY_SAMPLES, seed=seed, scenes=scenes)[:, None]
+
+        return cached_or_computed(entry, traced)[:, 0]
 
     shares = sum(share * sky_view(exterior) for exterior, share in exteriors).tolist()
     zone, surfaces = room.zone, list(room.zone.surfaces)

@@ -220,12 +220,15 @@ class RoomWork:
             "progress": progress,
         }
         room = inputs.building, space, inputs.systems, inputs.weather, options.room
+        result: RoomYear | DaylitRoom
         if self.with_heat:
-            return compute_room(*room, **choices)
-        choices["together"] = [one.guid for one in self.spaces]
-        light = lit_room(*room, **choices)
-        progress("heat", 1.0)
-        return light
+            result = compute_room(*room, **choices)
+        else:
+            choices["together"] = [one.guid for one in self.spaces]
+            result = lit_room(*room, **choices)
+            progress("heat", 1.0)
+        variants.return_memory()
+        return result
 
     def parallel(
         self, spaces: Sequence[Space], *, workers: Workers

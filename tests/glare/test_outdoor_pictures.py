@@ -14,7 +14,7 @@ from mitsuba_cfs.methods.point_in_time import path_picture
 from mitsuba_cfs.sky.annual import given_sky
 from mitsuba_cfs.sky.sun import direction
 from mitsuba_cfs.surfaces import Surfaces
-from mitsuba_cfs.trace.kernels.pixel_rows import Tiles, smoothing
+from mitsuba_cfs.trace.kernels.pixel_rows import Tiles, smoothing, surroundings
 from tests.trace import rooms
 
 pytestmark = [pytest.mark.early, pytest.mark.usefixtures("variant")]
@@ -156,13 +156,46 @@ def test_smoothing_keeps_what_is_even_and_what_there_is():
     keys = tiles.key(column, row, face)[shown]
     order = np.argsort(keys)
     count = random.uniform(0.1, 4.0, len(keys))
-    smooth = smoothing(tiles, keys[order], count)
+    smooth = smoothing(surroundings(tiles, keys[order]), count)
     assert smooth @ np.ones(len(keys)) == pytest.approx(np.ones(len(keys)), abs=1e-12)
     assert count @ smooth == pytest.approx(count, rel=1e-3)
     noise = random.normal(size=len(keys))
     assert np.std(smooth @ noise) < 0.5 * np.std(noise)
     across = smooth[np.ix_(face[shown][order] == 0, face[shown][order] == 1)]
     assert abs(across).sum() == 0
+
+
+def test_smoothing_is_the_product_of_its_balanced_steps():
+    tiles, random = Tiles(2, 40), np.random.default_rng(6)
+    row, column = np.divmod(np.flatnonzero(random.random(400) < 0.8), 20)
+    keys = np.sort(tiles.key(column, row, 0))
+    count, close = random.uniform(0.1, 4.0, len(keys)), random.random(len(keys)) < 0.2
+    expected = np.eye(len(keys))
+    for number, near in enumerate(one.toarray() for one in surroundings(tiles, keys)):
+        if number:  # the tiles beside another surface stay as they are
+            near[close], near[:, close] = 0.0, 0.0
+            near[close, close] = 1.0
+        x = np.ones(len(keys))
+        for _ in range(1000):
+            x = np.sqrt(x / (near @ (count * x)))
+        weights = x[:, None] * near * x * count
+        expected = weights / weights.sum(axis=1, keepdims=True) @ expected
+    found = smoothing(surroundings(tiles, keys), count, close).toarray()
+    np.testing.assert_allclose(found, expected, atol=1e-7)
+
+
+def test_a_face_is_what_one_surface_shows_in_one_direction():
+    from mitsuba_cfs.trace.kernels.pixel_rows import FACE_STEPS, face_numbers
+    from mitsuba_cfs.trace.kernels.scene import TracedScene
+
+    random = np.random.default_rng(7)
+    corners, surface = random.integers(-1, 2, (500, 3, 3)).astype(float), random.integers(0, 5, 500)
+    tracer = TracedScene(Surfaces(corners, np.full(500, 0.5), surface), centre=np.zeros(3))
+    number, normal = face_numbers(tracer), tracer.normal.numpy().T
+    table = np.column_stack([tracer.surface.numpy(), np.round(normal * FACE_STEPS)])
+    _, expected = np.unique(table, axis=0, return_inverse=True)
+    np.testing.assert_array_equal(number, expected.reshape(-1))
+    assert tracer.derived(face_numbers) is tracer.derived(face_numbers)
 
 
 def test_the_matrices_of_a_view_are_found_again_with_their_elements(tmp_path):

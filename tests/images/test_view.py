@@ -65,6 +65,15 @@ def test_top_left_pixel_looks_up_and_left():
     assert np.allclose(np.linalg.norm(directions[counts], axis=-1), 1)
 
 
+def test_solid_angles_are_those_of_all_views_of_one_projection() -> None:
+    here = fisheye((0, 0, 1.2), (0, 1, 0), 12)
+    there = fisheye((3, 1, 0.5), (1, 0.2, 0), 12)
+    omega = pixel_solid_angles(here)
+    assert pixel_solid_angles(there) is omega and not omega.flags.writeable
+    other = pixel_solid_angles(fisheye((0, 0, 1.2), (0, 1, 0), 12, kind="hemispherical"))
+    assert other.shape == omega.shape and not np.array_equal(other, omega)
+
+
 @pytest.mark.parametrize("kind", ["angular", "hemispherical"])
 def test_fisheye_solid_angles_fill_the_hemisphere(kind):
     view = fisheye((0, 0, 0), (0, 1, 0), 400, kind=kind)

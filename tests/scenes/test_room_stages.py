@@ -113,3 +113,14 @@ def test_without_pictures_none_is_rated(variant, glass, weather, skies, monkeypa
     assert not lit_room(*given, FEW.changed(picture_count=0), skies=skies).glare.pictures
     with pytest.raises(Computed):
         lit_room(*given, FEW, skies=skies)
+
+
+def test_memory_is_returned_after_long_stages_alone(monkeypatch) -> None:
+    returned: list[int] = []
+    monkeypatch.setattr(page.variants, "return_memory", lambda: returned.append(1))
+    for seconds, times in ((page.LONG / 2, 0), (2 * page.LONG, 1)):
+        clock = iter([0.0, seconds])
+        monkeypatch.setattr(page.time, "monotonic", lambda clock=clock: next(clock))
+        with StageTimes().stage("glare"):
+            pass
+        assert len(returned) == times

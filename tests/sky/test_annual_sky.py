@@ -62,6 +62,16 @@ def test_the_sun_alone_for_the_methods_is_made_once(sky):
     assert [list(one) for one in bare.totals(np.ones(3, bool))] == [[21, 7], [0, 0], [0, 0]]
 
 
+@pytest.mark.parametrize("dark", [False, True])
+def test_the_sun_in_some_hours_is_that_of_the_whole_sky(sky, dark):
+    wide = sky if not dark else replace(sky, whole=np.zeros((100, 3)), sun=np.eye(100)[:, [5, 7, 50]])
+    chosen = np.array([2, 0])
+    some = wide.lit_sun_in(chosen)
+    assert isinstance(some, np.ndarray) != dark
+    found = some.toarray().T if dark else some
+    assert found.tolist() == wide.sun_alone(chosen).tolist()
+
+
 def test_parts_by_number_or_mask_are_of_the_hours_alone(sky):
     solar = replace(sky, solar=sky.whole / 100)
     part = solar.part(np.array([False, True, True]))

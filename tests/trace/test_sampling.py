@@ -83,3 +83,18 @@ def test_every_seed_has_paths_of_its_own():
     assert lit.sum() > 30
     same = np.all(rows(0) == rows(1), axis=(1, 2))
     assert not same[lit].any()
+
+
+@pytest.mark.parametrize("samples", [1, 3, 8])
+def test_rays_spread_over_pixels_are_those_of_each_place_in_them(monkeypatch, samples):
+    from mitsuba_cfs.images.view import fisheye, pixel_rays
+    from mitsuba_cfs.trace.kernels import sampling
+
+    view = fisheye((0, 0, 1.2), (0.3, 1.0, 0.1), 20, kind="hemispherical")
+    pixels = np.random.default_rng(2).integers(0, 400, 50)
+    across, down = np.tile(sampling.pixel_positions(samples), (50, 1)).T
+    expected = pixel_rays(view, np.repeat(pixels, samples), across, down)
+    monkeypatch.setattr(sampling, "AT_ONCE", 40)
+    for found, one in zip(sampling.spread_rays(view, pixels, samples), expected, strict=True):
+        np.testing.assert_array_equal(found, one)
+    assert not expected[1].all() and not expected[0][~expected[1]].any()

@@ -85,6 +85,30 @@ def test_scenes_of_equal_triangles_share_one_structure():
     assert not {id(scene.scene._solid) for scene in other} & {id(traced[0].scene._solid)}
 
 
+def test_scenes_that_are_not_kept_share_the_structure_of_those_that_are(monkeypatch):
+    """The facades' and the sky's view take the structure that the windows' light is traced in."""
+    from mitsuba_cfs.trace.kernels import scene
+    from mitsuba_cfs.trace.matrices.daylight import sky_irradiance_matrix
+    from mitsuba_cfs.trace.matrices.view_factors import sky_shares
+
+    scenes, built = scene.SceneCache(scenes=1), []
+    kept = scenes.scene(town(), rooms.test_room()[1])
+    alone = scenes.of_surfaces(town(), np.array([0.0, -5.0, 2.0]))
+    assert alone.scene._solid is kept.scene._solid
+    assert scenes.scene(kept.surfaces, kept.groups) is kept  # it took no place among the kept
+    places, normals = np.array([[[0.0, -0.5, 2.0]]]), np.array([[0.0, -1.0, 0.0]])
+    expected = sky_shares(town(), places, normals)
+    monkeypatch.setattr(scene, "scene_of", lambda triangles: built.append(len(triangles)))
+    assert scenes.of_surfaces(town(), np.zeros(3)).scene._solid is kept.scene._solid and not built
+    monkeypatch.undo()
+    np.testing.assert_array_equal(sky_shares(town(), places, normals, scenes=scenes), expected)
+    rows = [
+        sky_irradiance_matrix(town(), places[0], normals, subdivision=1, samples=512, scenes=one).values
+        for one in (scenes, None)
+    ]
+    np.testing.assert_array_equal(*rows)
+
+
 def test_what_reaches_far_or_is_small_is_built_about_each_scenes_own_middle():
     from mitsuba_cfs.trace.kernels.scene import SolidMesh
 

@@ -231,6 +231,35 @@ def test_the_best_cut_removes_the_most_variance():
     assert _best_cut(cells, Region(np.full(3, 9.0), np.full(3, 10.0)), seen).gain < 0
 
 
+def test_each_cut_is_the_best_of_all_regions():
+    """By the means on both sides of every place, one after the other."""
+    from mitsuba_cfs.methods.subdivision import DARK, CellLight, level, reference_skies, subdivided
+
+    group, random = l_shape(), np.random.default_rng(5)
+    cells = window_cells(group)
+    light = CellLight(group, cells, random.random((len(cells.area), K, ReinhartSky(1).size)))
+    outside = light.daylight @ reference_skies()
+    weight = np.sqrt(OMEGA / np.pi)[:, None]
+    seen = (outside * weight / np.maximum(level(outside), DARK)).reshape(len(cells.area), -1)
+    regions = [Region.everything()]
+    while len(regions) < 4:
+        found = []
+        for number, region in enumerate(regions):
+            inside = np.flatnonzero(region.holds(cells.centre))
+            for axis in range(3):
+                at = np.unique(np.round(cells.centre[inside, axis], 6))
+                for place in 0.5 * (at[1:] + at[:-1]):
+                    below = cells.centre[inside, axis] < place
+                    a, b = inside[below], inside[~below]
+                    step = np.average(seen[a], 0, cells.area[a]) - np.average(seen[b], 0, cells.area[b])
+                    areas = [cells.area[one].sum() for one in (a, b, inside)]
+                    found.append((areas[0] * areas[1] / areas[2] * (step @ step), number, axis, float(place)))
+        _, number, axis, place = max(found)
+        regions += regions.pop(number).halves(axis, place)
+    for one, other in zip(subdivided(light, 4).regions, regions, strict=True):
+        np.testing.assert_array_equal([one.low, one.high], [other.low, other.high])
+
+
 def test_states_of_a_cut_group_go_together():
     from mitsuba_cfs.methods.optics import BsdfOptics
     from mitsuba_cfs.methods.scene import Sampling

@@ -25,10 +25,10 @@ class TracedGloss:
 
     def __init__(self, surfaces: Surfaces, normals: NDArray[np.float64], windows: int) -> None:
         """From opaque triangles [N] with normals [N, 3], followed by `windows` glazed ones."""
-        kinds = list(dict.fromkeys(surfaces.gloss[i] for i in surfaces.glossy))
+        glossy = surfaces.glossy
+        kinds = list(dict.fromkeys(surfaces.gloss[i] for i in glossy))
         of_surface = np.zeros(len(surfaces.gloss), dtype=np.int64)
-        for i in surfaces.glossy:
-            of_surface[i] = 1 + kinds.index(surfaces.gloss[i])
+        of_surface[glossy] = [1 + kinds.index(surfaces.gloss[i]) for i in glossy]
         kind = np.append(of_surface[surfaces.surface], np.zeros(windows, dtype=np.int64))
         table = [np.zeros(STEPS), *(_table(gloss) for gloss in kinds)]
         roughness = np.array([0.0, *(gloss.roughness for gloss in kinds)])

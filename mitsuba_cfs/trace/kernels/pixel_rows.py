@@ -10,7 +10,9 @@ noise of the row.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import drjit as dr
@@ -33,11 +35,13 @@ SMOOTHED_TILES = 16  # whole ones behind a row that is smoothed, below which its
 MOST_TIMES = 32  # as many paths
 
 
-def face_numbers(surface: NDArray, normal: NDArray[np.float64]) -> NDArray[np.int64]:
-    """The face [N] that each triangle belongs to: of one surface, in one direction [N, 3]."""
-    steps = np.round(np.asarray(normal) * FACE_STEPS).astype(np.int64)
-    table = np.column_stack([np.asarray(surface).astype(np.int64), steps])
-    return np.unique(table, axis=0, return_inverse=True)[1].reshape(-1)
+def face_numbers(tracer: TracedScene) -> NDArray[np.int64]:
+    """The face [N] that each triangle of a scene belongs to: of one surface, in one direction."""
+    steps = np.round(tables(tracer.normal)[0] * FACE_STEPS).astype(np.int64)
+    number, width = tracer.surface.numpy().astype(np.int64), 2 * FACE_STEPS + 1
+    for axis in steps.T:
+        number = number * width + axis
+    return np.unique(number, return_inverse=True)[1].reshape(-1)
 
 
 def numbered(row: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -95,8 +99,13 @@ def neighbours(tiles: Tiles, key: NDArray[np.int64], step: int) -> sparse.csr_ar
     return sparse.csr_array(entries, shape=(len(key), len(key)))
 
 
+def surroundings(tiles: Tiles, key: NDArray[np.int64]) -> list[sparse.csr_array]:
+    """The neighbours of tiles by which `smoothing` smooths them, one matrix [m, m] for each step."""
+    return [neighbours(tiles, key, step) for step in STEPS]
+
+
 def smoothing(
-    tiles: Tiles, key: NDArray[np.int64], count: NDArray, close: NDArray[np.bool_] | None = None
+    around: Sequence[sparse.csr_array], count: NDArray, close: NDArray[np.bool_] | None = None
 ) -> sparse.csr_array:
     """Smoothing of means over tiles by the tiles around each on its face [m, m].
 
@@ -104,24 +113,32 @@ def smoothing(
     are scaled to diag(x) A diag(x) with row and column sums of 1 (Sinkhorn and Knopp 1967).
 
     Args:
-        key: [m] as of `neighbours`; count: [m] weight of each mean.
+        around: of the tiles, `surroundings`; count: [m] weight of each mean.
         close: [m] tiles that another surface is close to, as in a corner, where light changes fast:
             only the tiles that touch them smooth them.
     """
     count = np.maximum(np.asarray(count, dtype=float), 1e-12)
-    whole = sparse.csr_array(sparse.eye_array(len(key)))
-    for step in STEPS:
-        near, x = neighbours(tiles, key, step), np.ones(len(key))
-        if close is not None and step > 1:
+    whole: sparse.csr_array | None = None
+    for near in around:
+        x = np.ones(len(count))
+        if close is not None and whole is not None:
             near = _apart(near, close)
         for _ in range(BALANCINGS):
             before, x = x, np.sqrt(x / (near @ (count * x)))
             if np.all(np.abs(x - before) <= BALANCED * x):
                 break
-        weights = sparse.diags_array(x) @ near @ sparse.diags_array(x * count)
-        rows = sparse.diags_array(1 / np.maximum(weights.sum(axis=1), 1e-300))
-        whole = sparse.csr_array(rows @ weights @ whole)
+        weights = _scaled(near, x, x * count)
+        rows = 1 / np.maximum(weights.sum(axis=1), 1e-300)
+        weights = _scaled(weights, rows, np.ones(len(rows)))
+        whole = weights if whole is None else sparse.csr_array(weights @ whole)
+    assert whole is not None
     return whole
+
+
+def _scaled(matrix: sparse.csr_array, rows: NDArray[np.float64], columns: NDArray[np.float64]) -> sparse.csr_array:
+    """A matrix times a factor of each row and each column."""
+    data = matrix.data * np.repeat(rows, np.diff(matrix.indptr)) * columns[matrix.indices]
+    return sparse.csr_array((data, matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def _apart(near: sparse.csr_array, close: NDArray[np.bool_]) -> sparse.csr_array:
@@ -183,7 +200,7 @@ class SharedLight:
         return value / np.maximum(share, 1e-300)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PictureRows:
     """The pixels that show something, and the row that each belongs to.
 
@@ -213,14 +230,14 @@ class PictureRows:
         tiles = Tiles(tile, view.width)
         if tile == 1:
             return cls(tiles, pixels, np.arange(len(pixels)), group, np.arange(len(pixels)))
-        faces = 1 + face_numbers(tracer.surface.numpy(), tables(tracer.normal)[0])
+        faces = 1 + tracer.derived(face_numbers)
         windows = faces.max() + 1 + group  # apart from surfaces in their plane
         face = faces[np.where(valid.numpy(), hit.prim_index.numpy().astype(np.int64), 0)]
         face = np.where(valid.numpy(), np.where(group == OPAQUE, face, windows), 0)
         keys, row = np.unique(tiles.of_pixels(pixels, face), return_inverse=True)
         return cls(tiles, pixels, row, group, keys)
 
-    @property
+    @cached_property
     def half(self) -> NDArray[np.int64]:
         """Half of a row that each pixel belongs to [n]: 2 * row or 2 * row + 1."""
         row, column = np.divmod(self.pixels, self.tiles.width)
@@ -273,8 +290,11 @@ class PictureRows:
         if self.tiles.size == 1:
             return sparse.csr_array(sparse.eye_array(len(self.keys), dtype=np.float32))
         total = np.bincount(self.row, share, minlength=len(self.keys))
-        matrix = smoothing(self.tiles, self.keys, np.maximum(total, least), close)
-        return matrix.astype(np.float32)
+        return smoothing(self._around, np.maximum(total, least), close).astype(np.float32)
+
+    @cached_property
+    def _around(self) -> list[sparse.csr_array]:
+        return surroundings(self.tiles, self.keys)
 
 
 def pixel_hits(

@@ -15,6 +15,7 @@ from mitsuba_cfs.images.view import View, pixel_rays
 from mitsuba_cfs.surfaces import even_numbers
 
 SHIFT_ROUNDS = 8
+AT_ONCE = 1 << 15  # rays computed in the processor's cache
 PADDED = 1 << 21  # sums from which on their number is what is asked for
 ALIGNMENT = 64  # of memory that kernels load whole vectors from [bytes]
 _DIMENSIONS = 6  # dimensions of the lattice; later decisions of a path are random
@@ -215,5 +216,10 @@ def pixel_positions(samples: int) -> NDArray[np.float64]:
 
 def spread_rays(view: View, pixels: NDArray[np.int64], samples: int) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Rays [n * samples, 3] evenly spread over some pixels [n], and which of them exist."""
-    across, down = np.tile(pixel_positions(samples), (len(pixels), 1)).T
-    return pixel_rays(view, np.repeat(pixels, samples), across, down)
+    across, down = pixel_positions(samples).T
+    directions, exists = np.empty((len(pixels), samples, 3)), np.empty((len(pixels), samples), dtype=bool)
+    size = max(1, AT_ONCE // samples)
+    for start in range(0, len(pixels), size):
+        part = slice(start, start + size)
+        directions[part], exists[part] = pixel_rays(view, pixels[part, None], across, down)
+    return directions.reshape(-1, 3), exists.reshape(-1)

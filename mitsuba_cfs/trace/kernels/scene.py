@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mitsuba_cfs import variants
-from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup, triangle_areas
+from mitsuba_cfs.surfaces import SharedOutdoors, Surfaces, WindowGroup, area_vectors, triangle_areas
 from mitsuba_cfs.trace.kernels.gloss import TracedGloss, TracedPanes
 from mitsuba_cfs.trace.kernels.random_walk import diffuse_direction
 from mitsuba_cfs.trace.kernels.rooms import TracedRoom, apart, joined_surfaces
@@ -36,9 +36,11 @@ class SolidMesh:
     def __init__(self, triangles: NDArray[np.float64]) -> None:
         """From triangles [N, 3, 3] [m]; the structure is built at its first use."""
         self.triangles = triangles
-        self.keep = triangle_areas(triangles) > 1e-10  # [N] [m2] slivers have no normal
+        across = area_vectors(triangles)
+        area = np.linalg.norm(across, axis=1)
+        self.keep = area > 1e-10  # [N] [m2] slivers have no normal
         solid = triangles[self.keep]
-        self.normals = unit_normals(solid)
+        self.normals = across[self.keep] / area[self.keep, None]
         corners = solid.reshape(-1, 3) if len(solid) else np.zeros((1, 3))
         self.bounds = np.stack([corners.min(axis=0), corners.max(axis=0)])
         self._scene: mi.Scene | None = None
@@ -229,7 +231,7 @@ class SharedScene:
 
 def unit_normals(triangles: NDArray[np.float64]) -> NDArray[np.float64]:
     """Unit normals [N, 3] of triangles [N, 3, 3], right-handed about their corners."""
-    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals = area_vectors(triangles)
     return normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
@@ -633,6 +635,10 @@ class SceneCache:
         while len(self._scenes) > self._most_scenes:
             self._scenes.popitem(last=False)
         return self._scenes[key][1]
+
+    def of_surfaces(self, surfaces: Surfaces, centre: ArrayLike) -> TracedScene:
+        """A scene of surfaces alone about a centre [3], which is not kept, unlike its mesh."""
+        return TracedScene(surfaces, centre=centre, mesh=self._mesh(surfaces.triangles))
 
     def together(self, rooms: Sequence[TracedRoom]) -> tuple[list[TracedRoom], TracedScene]:
         """Rooms moved apart from each other, and the scene of all of them."""

@@ -84,8 +84,9 @@ def window_batches(
             left = 1 if stopping is None else stopping.ahead(number)
             end = (number + max(1, min(left, together // G))) * G
             firsts = range(number * G, end, together)
-            parts = np.concatenate([launched(i, min(together, end - i)) for i in firsts])
-            ready.update(enumerate(parts.reshape(-1, G, K, columns), number))
+            parts = [launched(i, min(together, end - i)) for i in firsts]
+            joined = parts[0] if len(parts) == 1 else np.concatenate(parts)
+            ready.update(enumerate(joined.reshape(-1, G, K, columns), number))
         return ready.pop(number)
 
     return batch

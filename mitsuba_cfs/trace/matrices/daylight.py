@@ -37,7 +37,7 @@ from mitsuba_cfs.trace.kernels.sampling import (
     sums_of,
     vectors,
 )
-from mitsuba_cfs.trace.kernels.scene import TracedScene
+from mitsuba_cfs.trace.kernels.scene import SceneCache, TracedScene
 from mitsuba_cfs.trace.kernels.window_paths import WindowPaths, window_batches
 from mitsuba_cfs.window_parts import Cells
 
@@ -367,6 +367,7 @@ def sky_irradiance_matrix(
     seed: int = 0,
     progress: Progress = silent,
     cache: MatrixCache | None = None,
+    scenes: SceneCache | None = None,
 ) -> Estimate:
     """Irradiance at sensors outdoors per unit radiance of each sky patch [S, P] [sr, projected].
 
@@ -387,7 +388,8 @@ def sky_irradiance_matrix(
     middles, directions = sensors_of(places.mean(axis=1), directions)
     if max_depth == 1:  # what the sensor sees itself, mirrors are left to the rest
         surfaces = replace(surfaces, gloss=())
-    tracer = TracedScene(surfaces, centre=middles.mean(axis=0))
+    scenes = SceneCache() if scenes is None else scenes
+    tracer = scenes.of_surfaces(surfaces, middles.mean(axis=0))
     sky = SkyBins(ReinhartSky(subdivision))
     accepted = AcceptedDirections(acceptance)
     S, P, n = len(places), sky.size, int(samples)

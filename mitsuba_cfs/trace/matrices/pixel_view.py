@@ -91,7 +91,7 @@ def picture_part_blocks(
     shown = np.flatnonzero(pixel_directions(view)[1].reshape(-1)) if pixels is None else pixels
     row = np.arange(len(shown)) if row is None else row
     weight = np.ones(len(shown)) if weight is None else weight
-    held = 2 * len(np.unique(row)) / max(len(row), 1)  # rows for each pixel
+    held = 2 * np.count_nonzero(np.bincount(row)) / max(len(row), 1)  # rows for each pixel
     held += tracer.gloss is not None
     columns = len(groups) * bins.size if light is None else light.hours
     size = max(256, int(BLOCK_BYTES / (8 * held * columns)))
@@ -121,7 +121,8 @@ def _block(
     Args: chosen: pixels [n], their repetition numbers from 0 [n], rows and weights [n].
     """
     pixels, time, row, weight = chosen
-    rows, place = np.unique(row, return_inverse=True)
+    some = np.bincount(row) > 0
+    rows, place = np.flatnonzero(some), (np.cumsum(some) - 1)[row]
     n, b = len(pixels), len(rows)
     own = n if tracer.gloss is not None else 0  # rows of what pixels show by gloss
     columns = len(tracer.groups) * bins.size

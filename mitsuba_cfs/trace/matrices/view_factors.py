@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from mitsuba_cfs.directions import window_frame
 from mitsuba_cfs.surfaces import Surfaces, points_on_triangles
 from mitsuba_cfs.trace.kernels.sampling import vectors
-from mitsuba_cfs.trace.kernels.scene import TracedScene
+from mitsuba_cfs.trace.kernels.scene import SceneCache
 
 FloatArray = NDArray[np.float64]
 ROOT = 1.1673039782614187  # of x^5 = x + 1
@@ -73,7 +73,13 @@ def person_view_factors(
 
 
 def sky_shares(
-    surfaces: Surfaces, points: ArrayLike, normals: ArrayLike, *, samples: int = 4096, seed: int = 0
+    surfaces: Surfaces,
+    points: ArrayLike,
+    normals: ArrayLike,
+    *,
+    samples: int = 4096,
+    seed: int = 0,
+    scenes: SceneCache | None = None,
 ) -> FloatArray:
     """Sky view of planes outdoors [S] over that without obstructions.
 
@@ -83,6 +89,7 @@ def sky_shares(
         surfaces: all that stands outdoors.
         points: [S, K, 3] places of each plane [m]; normals: [S, 3].
         samples: rays from each plane, rounded up to a power of two.
+        scenes: that have the mesh of the surfaces, or get it.
     """
     points, normals = np.asarray(points, dtype=float), np.asarray(normals, dtype=float)
     S, K = points.shape[:2]
@@ -91,7 +98,7 @@ def sky_shares(
     plan = _Plan(samples, seed)
     rays = [_cosine(window_frame(n)[None], plan.numbers(k)[:, 2:]) for k, n in enumerate(normals)]
     places = points[:, np.arange(plan.count) % K]
-    hits = _hits(surfaces, places.reshape(-1, 3), np.concatenate(rays)).reshape(S, -1)
+    hits = _hits(surfaces, places.reshape(-1, 3), np.concatenate(rays), scenes).reshape(S, -1)
     up = np.stack(rays)[..., 2] > 0
     free, sky = (up & (hits < 0)).sum(axis=1), up.sum(axis=1)
     return np.where(sky > 0, free / np.maximum(sky, 1), 1.0)
@@ -127,10 +134,12 @@ def _cosine(frames: FloatArray, u: FloatArray) -> FloatArray:
     return np.einsum("ni,nij->nj", local, np.broadcast_to(frames, (len(u), 3, 3)))
 
 
-def _hits(surfaces: Surfaces, origins: FloatArray, directions: FloatArray) -> NDArray[np.int64]:
+def _hits(
+    surfaces: Surfaces, origins: FloatArray, directions: FloatArray, scenes: SceneCache | None = None
+) -> NDArray[np.int64]:
     """The part that each ray meets first, -1 for none."""
     centre = surfaces.triangles.mean(axis=(0, 1))
-    tracer = TracedScene(surfaces, centre=centre)
+    tracer = (SceneCache() if scenes is None else scenes).of_surfaces(surfaces, centre)
     towards = vectors(directions)
     start = vectors(origins - centre, mi.Point3f) + towards * tracer.epsilon
     hit = tracer.scene.ray_intersect_preliminary(mi.Ray3f(start, towards), coherent=False)

@@ -21,8 +21,8 @@ from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
-from mitsuba_cfs.trace.kernels.pixel_rows import Tiles, face_numbers, numbered, smoothing, tile_size
-from mitsuba_cfs.trace.kernels.sampling import column, empty_sums, opaque, path_generator, sums_of, tables, vectors
+from mitsuba_cfs.trace.kernels.pixel_rows import Tiles, face_numbers, numbered, smoothing, surroundings, tile_size
+from mitsuba_cfs.trace.kernels.sampling import column, empty_sums, opaque, path_generator, sums_of, vectors
 from mitsuba_cfs.trace.kernels.scattering import KlemsScattering
 from mitsuba_cfs.trace.kernels.scene import SceneCache, TracedScene
 from mitsuba_cfs.trace.kernels.view_paths import add_view_paths
@@ -142,7 +142,7 @@ class _MetInRoom:
     ) -> None:
         self.room, self.tracer, self.bins = room, tracer, DirectionBins(KLEMS_FULL)
         self._tiles, self._columns = tiles, len(room.groups) * KLEMS_FULL.size
-        self._faces = face_numbers(tracer.surface.numpy(), tables(tracer.normal)[0])
+        self._faces = tracer.derived(face_numbers)
         self._outdoors = room.onward[0].first if room.onward else len(room.groups)
         outside = scenes.scene(room.exterior, room.groups[: self._outdoors], centre=tracer.centre)
         self._beyond = SeenOutdoors(outside, sky, tiles)
@@ -202,7 +202,7 @@ class _MetInRoom:
             _shares(_joined(self._share), slots, (count, self._columns)),
             np.maximum(luminance - beam[..., None] * daylight, 0).reshape(flat),
             _shares(share, (pixel, tile), (count, len(keys))),
-            smoothing(self._tiles, keys, size).astype(np.float32) @ light,
+            smoothing(surroundings(self._tiles, keys), size).astype(np.float32) @ light,
             luminance.reshape(flat),
             self._beyond.sky(),
             _shares(outdoors.value, (outdoors.pixel, outdoors.tile), (count, reflected.shape[0])),

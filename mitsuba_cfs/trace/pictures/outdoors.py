@@ -20,7 +20,7 @@ from mitsuba_cfs.images.view import View, pixel_directions
 from mitsuba_cfs.sky.patches import ReinhartSky
 from mitsuba_cfs.surfaces import Surfaces, WindowGroup
 from mitsuba_cfs.trace.kernels.bins import DirectionBins, SkyBins
-from mitsuba_cfs.trace.kernels.pixel_rows import Tiles, face_numbers, smoothing, tile_size
+from mitsuba_cfs.trace.kernels.pixel_rows import Tiles, face_numbers, smoothing, surroundings, tile_size
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
 from mitsuba_cfs.trace.kernels.sampling import (
     column,
@@ -112,7 +112,7 @@ class SeenOutdoors:
     def __init__(self, outside: TracedScene, sky: SkyBins, tiles: Tiles) -> None:
         """Empty."""
         self._outside, self._sky, self._tiles = outside, sky, tiles
-        self._face = face_numbers(outside.surface.numpy(), tables(outside.normal)[0])
+        self._face = outside.derived(face_numbers)
         self._free: list[sparse.csr_array] = []
         self._shown: list[ShownFaces] = []
         self._rough: list[RoughFaces] = []
@@ -137,7 +137,7 @@ class SeenOutdoors:
         """The faces by tile, their smoothing [C, C], and their smoothed irradiance [C, P]."""
         found, keys = _joined(self._shown)
         count = np.bincount(found.tile, minlength=len(keys))
-        smooth = smoothing(self._tiles, keys, count)
+        smooth = smoothing(surroundings(self._tiles, keys), count)
         reflected = smooth @ _reflected(self._outside, self._sky, found, len(keys), seed)
         return found, smooth, sparse.csr_array(reflected.astype(np.float32))
 

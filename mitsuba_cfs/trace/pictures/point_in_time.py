@@ -24,15 +24,7 @@ from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.sun import SUN_SOLID_ANGLE
 from mitsuba_cfs.trace.kernels.pixel_rows import STEPS, SharedLight, Tiles, face_numbers, tile_size
 from mitsuba_cfs.trace.kernels.random_walk import PathStarts
-from mitsuba_cfs.trace.kernels.sampling import (
-    lattice,
-    lattice_2d,
-    path_generator,
-    pixel_positions,
-    streams,
-    tables,
-    vectors,
-)
+from mitsuba_cfs.trace.kernels.sampling import lattice, lattice_2d, path_generator, pixel_positions, streams, vectors
 from mitsuba_cfs.trace.kernels.scene import OPAQUE, TracedScene
 from mitsuba_cfs.trace.paths.disc import add_discs, eye_of
 from mitsuba_cfs.trace.paths.point_in_time import add_paths, leave, window_parts, window_sun
@@ -174,7 +166,7 @@ class _Faces:
 
     @staticmethod
     def _table(scene: TracedScene) -> tuple[mi.UInt32, int]:
-        face = face_numbers(scene.surface.numpy(), tables(scene.normal)[0])
+        face = scene.derived(face_numbers)
         return mi.UInt32(face.astype(np.uint32)), int(face.max()) + 1
 
     def inside(self, prim: mi.UInt32, behind: mi.Bool, active: mi.Bool) -> mi.UInt32:
