@@ -397,7 +397,7 @@ def in_place_of_sun(
     sensors = sensor_light(light)
     chosen = [sensors[g][j] for g, j in enumerate(kind)]
     by_sun = _total([one.coefficients.by_sun for one in chosen])[some]
-    values = -phases.times_sky(by_sun, sun_in(light, hours))
+    values = -phases.times_sky(by_sun, light.sky.lit_sun_in(hours))
     for one in chosen:
         if one.added is not None:
             values += one.added[some] if all_hours(light, hours) else one.added[some][:, hours]
@@ -530,14 +530,6 @@ def _in_states(values: Sequence[Array | None], row: NDArray[np.int64]) -> Array:
     for j, one in enumerate(states):
         chosen[:, row == j] = one[:, row == j]
     return chosen
-
-
-def sun_in(light: PhaseLight, hours: NDArray[np.int64]) -> phases.Sky:
-    """The sun alone in some of the sky's hours, as products take it."""
-    sun = light.sky.lit_sun
-    if all_hours(light, hours):
-        return sun
-    return sun[:, hours] if isinstance(sun, np.ndarray) else sun[hours]
 
 
 def all_hours(light: PhaseLight, hours: NDArray[np.int64]) -> bool:

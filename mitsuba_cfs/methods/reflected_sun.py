@@ -316,7 +316,7 @@ def replaced_before(sun: ReflectedSun, shares: Array | None, hours: NDArray[np.i
     if shares is not None:  # in single precision, as the windows' light is
         light = shares.astype(np.float32) @ light
     values[:, number[hours] >= 0] = light
-    return values - times_sky(by_patches, sun.sky.sun_alone(hours))
+    return values - times_sky(by_patches, sun.sky.lit_sun_in(hours))
 
 
 def replaced_through(sun: ReflectedSun, parts: NDArray[np.int64], shares: Sequence[Array]) -> NDArray[np.float64]:

@@ -58,7 +58,6 @@ from mitsuba_cfs.methods.phase_light import (
     shining_hours,
     sky_coefficients,
     states_of,
-    sun_in,
     traced_states,
     with_means,
     with_sensor_light,
@@ -269,7 +268,7 @@ class _Season:
         for light in self._modes:
             whole = sky_coefficients(light, kind)
             coefficients.append(whole.astype(np.float32))
-            by_sun.append(times_sky(whole, sun_in(light, hours)) + in_place_of_sun(light, kind, hours))
+            by_sun.append(times_sky(whole, light.sky.lit_sun_in(hours)) + in_place_of_sun(light, kind, hours))
             if light.matrices.five_phase:
                 direct.append(direct_sun_of_all(light, kind, hours))
         amount = sky.amount

@@ -197,6 +197,13 @@ class AnnualSky:
             self._lit_sun.append(lit_rows(self.sun))
         return self._lit_sun[0]
 
+    def lit_sun_in(self, hours: NDArray[np.int64]) -> NDArray[np.floating] | csr_array:
+        """The same in some of the hours L."""
+        sun = self.lit_sun
+        if np.array_equal(hours, np.arange(len(self.lit))):
+            return sun
+        return sun[:, hours] if isinstance(sun, np.ndarray) else sun[hours]
+
     def sun_alone(self, hours: Any = slice(None)) -> NDArray[np.floating]:
         """Luminance [P, n] of the sun alone, of some of the hours L [cd/m2]."""
         if self.sun is None:
