@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LogNorm, Normalize, hsv_to_rgb
 from matplotlib.figure import Figure
-from matplotlib.image import AxesImage, imsave
+from matplotlib.image import imsave
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator
 from numpy.typing import NDArray
@@ -58,30 +57,48 @@ def write_falsecolour(
     """
     low, high = limits or scale_limits(luminance if seen is None else luminance[seen])
     shown = np.maximum(luminance, low) if logarithmic else luminance
-    figure, axes, image = _falsecolour_frame(luminance.shape, low, high, logarithmic)
-    image.set_data(np.ma.masked_array(shown, None if seen is None else ~seen))
-    axes.set_title(title, **TITLE)
-    _save(figure, path)
+    frame = _falsecolour_frame(luminance.shape, low, high, logarithmic)
+    frame.write(path, np.ma.masked_array(shown, None if seen is None else ~seen), title)
+
+
+class _FalsecolourFrame:
+    """A figure with a scale, drawn once, and in it the place of a picture and its title."""
+
+    def __init__(self, shape: tuple[int, int], norm: Normalize) -> None:
+        self._figure = _figure(shape)
+        self._axes = self._figure.add_axes((0.02, 0.02, 0.78, 0.90))
+        self._image = self._axes.imshow(np.full(shape, norm.vmin), cmap=COLOURS, norm=norm, interpolation="nearest")
+        self._axes.set_axis_off()
+        self._draw_scale(logarithmic=isinstance(norm, LogNorm))
+
+    def _draw_scale(self, *, logarithmic: bool) -> None:
+        bar = self._figure.colorbar(self._image, cax=self._figure.add_axes((0.83, 0.08, 0.035, 0.78)))
+        bar.ax.set_title("cd/m²", **TITLE)
+        bar.ax.tick_params(labelsize=8)
+        if logarithmic:
+            bar.ax.yaxis.set_major_locator(LogLocator(10, subs=(1.0, 3.0), numticks=20))
+            bar.minorticks_off()  # a quarter of the time of the picture, without a number beside one
+        bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _mark(value)))
+        self._axes.set_visible(False)
+        self._canvas = FigureCanvasAgg(self._figure)
+        self._canvas.draw()
+        self._scale = self._canvas.copy_from_bbox(self._figure.bbox)
+        self._axes.set_visible(True)
+
+    def write(self, path: Path, values: NDArray[Any], title: str) -> None:
+        """Write the frame with a picture [ny, nx] and a title (PNG)."""
+        self._image.set_data(values)
+        self._axes.set_title(title, **TITLE)
+        self._canvas.restore_region(self._scale)
+        self._axes.draw(self._canvas.get_renderer())
+        with replacing(path) as part:
+            imsave(part, self._canvas.buffer_rgba(), dpi=DPI, format="png")
 
 
 @lru_cache(maxsize=8)  # the pictures of a run share a few; making one takes as long as drawing it
-def _falsecolour_frame(
-    shape: tuple[int, int], low: float, high: float, logarithmic: bool
-) -> tuple[Figure, Axes, AxesImage]:
-    """A figure with a scale, and in it the place of a picture and its title."""
-    norm = LogNorm(low, high, clip=True) if logarithmic else Normalize(low, high, clip=True)
-    figure = _figure(shape)
-    axes = figure.add_axes((0.02, 0.02, 0.78, 0.90))
-    image = axes.imshow(np.full(shape, low), cmap=COLOURS, norm=norm, interpolation="nearest")
-    axes.set_axis_off()
-    bar = figure.colorbar(image, cax=figure.add_axes((0.83, 0.08, 0.035, 0.78)))
-    bar.ax.set_title("cd/m²", **TITLE)
-    bar.ax.tick_params(labelsize=8)
-    if logarithmic:
-        bar.ax.yaxis.set_major_locator(LogLocator(10, subs=(1.0, 3.0), numticks=20))
-        bar.minorticks_off()  # a quarter of the time of the picture, without a number beside one
-    bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _mark(value)))
-    return figure, axes, image
+def _falsecolour_frame(shape: tuple[int, int], low: float, high: float, logarithmic: bool) -> _FalsecolourFrame:
+    """The frame of pictures of a shape, with a scale from low to high."""
+    return _FalsecolourFrame(shape, (LogNorm if logarithmic else Normalize)(low, high, clip=True))
 
 
 def tone_mapped(pixels: NDArray[Any], *, white: float | None = None) -> NDArray[np.uint8]:

@@ -489,3 +489,15 @@ def method_notes(figures: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
             )
         )
     return (*notes, *lobe_notes(figures))
+
+
+def sensor_table(values: NDArray[np.float32], times: pd.DatetimeIndex) -> pd.DataFrame:
+    """Values of sensors [H, S] with the sensors' numbers as columns."""
+    columns = [f"sensor_{i}" for i in range(values.shape[1])]
+    return pd.DataFrame(values, index=times, columns=columns).rename_axis("time")
+
+
+def glare_table(result: GlareResults, times: pd.DatetimeIndex) -> pd.DataFrame:
+    """One row for each picture: its time and glare."""
+    rows = [{"time": times[p.hour], **p.glare} for p in result.pictures]
+    return pd.DataFrame(rows).set_index("time")

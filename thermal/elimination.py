@@ -32,6 +32,9 @@ class Elimination(NamedTuple):
     # [E] entry that the first product of each entry is taken from, where its others are the next
     # ones: in rooms, whose faces all exchange; else -1
     run: NDArray[np.int64]
+    # [B + 1] first column of each block: of columns that follow each other and have the same rows below the
+    # block's last, as a room's faces mostly have
+    block: NDArray[np.int64]
 
     def entries(self, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
         """Entry of each pair of unknowns [P, 2]: [P]."""
@@ -77,10 +80,28 @@ def elimination(unknowns: int, pairs: Iterable[tuple[int, int]]) -> Elimination:
             products = start[row] + np.searchsorted(columns[row], column[number + 1 :])
             target.append(products)
             run.append(products[0] if len(products) and (np.diff(products) == 1).all() else -1)
-    targets = np.concatenate(target).astype(np.uint64)
     return Elimination(
-        place=place, start=start, rows=rows.astype(np.uint64), target=targets, run=np.array(run, dtype=np.int64)
+        place=place,
+        start=start,
+        rows=rows.astype(np.uint64),
+        target=np.concatenate(target).astype(np.uint64),
+        run=np.array(run, dtype=np.int64),
+        block=_blocks(columns),
     )
+
+
+BLOCK = 4  # columns at most whose products are taken from the entries to their right in one go
+
+
+def _blocks(columns: list[NDArray[np.int64]]) -> NDArray[np.int64]:
+    """The first column of each block, and their number."""
+    first: list[int] = []
+    for number, column in enumerate(columns):
+        before = columns[number - 1] if first and number - first[-1] < BLOCK else ()
+        follows = len(before) == len(column) + 1 and before[0] == number
+        if not follows:
+            first.append(number)
+    return np.array([*first, len(columns)], dtype=np.int64)
 
 
 @inlined
@@ -94,24 +115,71 @@ def eliminate(
     where each product goes looked up.
     """
     d, e, b, at = diagonal, below, right, 0
-    for k in range(d.size):
-        d[k] = 1.0 / d[k]
-        end = system.start[k + 1]
-        for m in range(system.start[k], end):
-            i, f = system.rows[m], e[m] * d[k]
-            d[i] -= f * e[m]
-            b[i] -= f * b[k]
-            first, count = system.run[m], end - m - 1
-            if first >= 0:
-                taken, products = e[first : first + count], e[m + 1 : end]
-                for q in range(count):
-                    taken[q] -= f * products[q]
-            else:
-                for q in range(count):
-                    e[system.target[at + q]] -= f * e[m + 1 + q]
-            at += count
+    for c in range(system.block.size - 1):
+        first, last = system.block[c], system.block[c + 1] - 1
+        for k in range(first, last):
+            _within_block(system, d, e, b, k, last)
+            count = system.start[k + 1] - system.start[k]
+            at += count * (count - 1) // 2
+        d[last] = 1.0 / d[last]
+        at = _below_block(system, d, e, b, first, last, at)
     for j in range(d.size - 1, -1, -1):
         s = b[j]
         for m in range(system.start[j], system.start[j + 1]):
             s -= e[m] * b[system.rows[m]]
         b[j] = s * d[j]
+
+
+@inlined
+def _within_block(
+    system: Elimination, d: NDArray[np.float64], e: NDArray[np.float64], b: NDArray[np.float64], k: int, last: int
+) -> None:
+    """Eliminate a column from those after it in its block, whose rows are all its own."""
+    d[k] = 1.0 / d[k]
+    m, end = system.start[k], system.start[k + 1]
+    for i in range(k + 1, last + 1):
+        f = e[m] * d[k]
+        d[i] -= f * e[m]
+        b[i] -= f * b[k]
+        m += 1
+        taken, products = e[system.start[i] : system.start[i + 1]], e[m:end]
+        for q in range(taken.size):
+            taken[q] -= f * products[q]
+
+
+@inlined
+def _below_block(
+    system: Elimination,
+    d: NDArray[np.float64],
+    e: NDArray[np.float64],
+    b: NDArray[np.float64],
+    first: int,
+    last: int,
+    at: int,
+) -> int:
+    """Eliminate the columns of a block from those after it; returns where the targets of the next begin.
+
+    Each entry loses the products of `BLOCK` columns in their order; those that a block lacks are 0 times its last.
+    """
+    start, rest = system.start[last], system.start[last + 1] - system.start[last]
+    k0, k1, k2, lacks = max(last - 3, first), max(last - 2, first), max(last - 1, first), BLOCK - 1 - (last - first)
+    w0, w1, w2 = d[k0] if lacks < 1 else 0.0, d[k1] if lacks < 2 else 0.0, d[k2] if lacks < 3 else 0.0
+    end0, end1, end2 = system.start[k0 + 1], system.start[k1 + 1], system.start[k2 + 1]
+    c0, c1, c2, c3 = e[end0 - rest : end0], e[end1 - rest : end1], e[end2 - rest : end2], e[start : start + rest]
+    for m in range(rest):
+        i, count = system.rows[start + m], rest - m - 1
+        f0, f1, f2, f3 = c0[m] * w0, c1[m] * w1, c2[m] * w2, c3[m] * d[last]
+        d[i] = d[i] - f0 * c0[m] - f1 * c1[m] - f2 * c2[m] - f3 * c3[m]
+        b[i] = b[i] - f0 * b[k0] - f1 * b[k1] - f2 * b[k2] - f3 * b[last]
+        run = system.run[start + m]
+        p0, p1, p2, p3 = c0[m + 1 :], c1[m + 1 :], c2[m + 1 :], c3[m + 1 :]
+        if run >= 0:
+            taken = e[run : run + count]
+            for q in range(count):
+                taken[q] = taken[q] - f0 * p0[q] - f1 * p1[q] - f2 * p2[q] - f3 * p3[q]
+        else:
+            for q in range(count):
+                t = system.target[at + q]
+                e[t] = e[t] - f0 * p0[q] - f1 * p1[q] - f2 * p2[q] - f3 * p3[q]
+        at += count
+    return at

@@ -6,6 +6,9 @@ itself. `thermal.comfort` imports this module when it needs it.
 
 from __future__ import annotations
 
+import os
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from numpy.typing import NDArray
 from pythermalcomfort.models.two_nodes_gagge import _gagge_two_nodes_optimized as two_nodes
@@ -24,13 +27,20 @@ def set_of_hours(
     metabolic_rate: float,
     clothing: float,
 ) -> FloatArray:
-    """SET [...] [degC] as of pythermalcomfort's `set_tmp`, neither rounded nor limited.
+    """SET [...] [degC] as of pythermalcomfort's `set_tmp`, neither rounded nor limited; the hours by all cores.
 
     Args: of one shape; humidity: relative [%]; metabolic_rate in met, clothing in clo.
     """
     vapour = humidity * p_sat_torr(air_c) / 100
-    flat = (np.ravel(values).astype(float) for values in (air_c, mrt_c, speed, vapour))
-    return _set(*flat, float(metabolic_rate), float(clothing)).reshape(air_c.shape)
+    flat = [np.ravel(values).astype(float) for values in (air_c, mrt_c, speed, vapour)]
+    threads = os.cpu_count() or 1
+    parts = (np.array_split(values, threads) for values in flat)
+
+    def of_part(*hours: FloatArray) -> FloatArray:
+        return _set(*hours, float(metabolic_rate), float(clothing))
+
+    with ThreadPoolExecutor(threads) as pool:
+        return np.concatenate([*pool.map(of_part, *parts)]).reshape(air_c.shape)
 
 
 @compiled(nogil=True)

@@ -57,9 +57,9 @@ class Chart:
 def line(x: ArrayLike, y: ArrayLike, x_range: ArrayLike, y_range: ArrayLike) -> str:
     """SVG path through points [N]; broken where y is not finite."""
     px, py = _boxed(x, x_range), BOX - _boxed(y, y_range)
-    parts, pen = [], "M"
-    for a, b in zip(px, py, strict=True):
-        if not (np.isfinite(a) and np.isfinite(b)):
+    parts, pen, drawn = [], "M", np.isfinite(px) & np.isfinite(py)
+    for a, b, there in zip(px.tolist(), py.tolist(), drawn.tolist(), strict=True):
+        if not there:
             pen = "M"
             continue
         parts.append(f"{pen}{a:.1f} {b:.1f}")

@@ -12,17 +12,18 @@ from PIL import Image
 
 
 def png_uri(rgba: NDArray[np.uint8]) -> str:
-    """Colours [ny, nx, 3 or 4] as a PNG data URI, at most 256 colours kept exactly."""
-    if rgba.shape[-1] == 3:
-        packed = rgba.astype(np.uint32) @ np.array([1 << 16, 1 << 8, 1], dtype=np.uint32)
-        colours, index = np.unique(packed, return_inverse=True)
-    if rgba.shape[-1] == 3 and len(colours) <= 256:
-        picture = Image.fromarray(index.reshape(rgba.shape[:2]).astype(np.uint8))
-        palette = colours[:, None] >> np.array([16, 8, 0], dtype=np.uint32) & 255
-        picture.putpalette(palette.astype(np.uint8).tobytes())
-    else:
-        picture = Image.fromarray(np.ascontiguousarray(rgba))
-    return _uri(picture, "png", optimize=True)
+    """Colours [ny, nx, 3 or 4] as a PNG data URI, at most 256 colours as numbers of a palette."""
+    channels = rgba.shape[-1]
+    packed = np.zeros((*rgba.shape[:2], 4), dtype=np.uint8)
+    packed[..., :channels] = rgba
+    colours, index = np.unique(packed.view(np.uint32), return_inverse=True)
+    if len(colours) > 256:
+        return _uri(Image.fromarray(np.ascontiguousarray(rgba)), "png", optimize=True)
+    picture = Image.fromarray(index.reshape(rgba.shape[:2]).astype(np.uint8))
+    palette = colours.view(np.uint8).reshape(-1, 4)
+    picture.putpalette(palette[:, :3].tobytes())
+    alpha = {"transparency": palette[:, 3].tobytes()} if channels == 4 else {}
+    return _uri(picture, "png", optimize=True, **alpha)
 
 
 def photo_uri(rgb: NDArray[np.uint8], quality: int = 88) -> str:

@@ -87,12 +87,12 @@ def listed(names: list[str]) -> str:
 
 def month_name(month: int) -> str:
     """The name of a month, 1 to 12, as it stands by itself."""
-    return _months("wide")[month]
+    return _months("wide", _locale())[month]
 
 
 def short_month(month: int) -> str:
     """The short name of a month, 1 to 12."""
-    return _months("abbreviated")[month]
+    return _months("abbreviated", _locale())[month]
 
 
 def day_and_month(time: pd.Timestamp, *, short: bool = False) -> str:
@@ -112,10 +112,11 @@ def spoken(time: pd.Timestamp) -> str:
     return gettext("{date} at {clock}", date=day_and_month(time), clock=f"{time:%H:%M}")
 
 
-def _months(width: str) -> dict[int, str]:
+@lru_cache(maxsize=16)
+def _months(width: str, locale: str) -> dict[int, str]:
     from babel.dates import get_month_names
 
-    return dict(get_month_names(width, context="stand-alone", locale=_locale()))
+    return dict(get_month_names(width, context="stand-alone", locale=locale))
 
 
 def _locale() -> str:

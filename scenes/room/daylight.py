@@ -111,12 +111,6 @@ def overcast_factor_error(light: PhaseLight | SeasonalLight) -> NDArray[np.float
     return relative * overcast_factor(light)
 
 
-def sensor_table(values: NDArray[np.float32], times: pd.DatetimeIndex) -> pd.DataFrame:
-    """Values of sensors [H, S] with the sensors' numbers as columns."""
-    columns = [f"sensor_{i}" for i in range(values.shape[1])]
-    return pd.DataFrame(values, index=times, columns=columns).rename_axis("time")
-
-
 SENSOR_COLUMNS = {  # column of a run: column of the library
     "da300": "daylight_autonomy",
     "cda300": "continuous_daylight_autonomy",

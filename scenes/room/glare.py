@@ -266,12 +266,6 @@ def room_glare(
     return GlareResults(light.scene.view, tuple(pictures), rating.rule)
 
 
-def glare_table(result: GlareResults, times: pd.DatetimeIndex) -> pd.DataFrame:
-    """One row for each picture: its time and glare."""
-    rows = [{"time": times[p.hour], **p.glare} for p in result.pictures]
-    return pd.DataFrame(rows).set_index("time")
-
-
 def brightest_picture(glare: GlareResults) -> LuminancePicture:
     """The picture with most light at the eye."""
     return max(glare.pictures, key=lambda picture: picture.glare["ev"])

@@ -185,7 +185,7 @@ def _surface_names(room: RoomYear) -> list[str]:
 
 def _pictures(result: RunResult, names: Iterable[str]) -> Variables:
     """Glare of the pictures, with their times and rooms."""
-    from scenes.room.glare import glare_table  # loads the tracer
+    from scenes.results import glare_table  # loads numba
 
     tables = [
         glare_table(room.glare, result.times).reset_index().assign(room=name)

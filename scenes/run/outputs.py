@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import shutil
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from contextvars import copy_context
 from dataclasses import dataclass
-from functools import lru_cache
-from itertools import chain, pairwise
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from bim.names import folder_names
 from bim.report.issue import COLUMNS, issue_rows
-from mitsuba_cfs.files import check_finite, json_text, without_formulas, write_table, write_text
+from mitsuba_cfs.files import json_text, write_table, write_text
 from mitsuba_cfs.images.hdr import write_hdr
 from mitsuba_cfs.progress import Progress, silent
 from scenes.language.catalogue import current_language, gettext, in_language
 from scenes.language.numbers import rounded, spoken
 from scenes.pictures import write_falsecolour, write_tone_mapped
 from scenes.result_folder import EXPLORER, FIRST_PLAN, REPORT, ResultFolder
-from scenes.results import GridDaylight, RoomYear, RunResult, SpectralYear
-from scenes.room.daylight import sensor_table
-from scenes.room.glare import glare_table
+from scenes.results import GridDaylight, RoomYear, RunResult, SpectralYear, glare_table, sensor_table
+from scenes.run.csv_text import csv_text
 from scenes.run.ladybug import NAME as LADYBUG
 from scenes.run.ladybug import write_ladybug
 from scenes.run.netcdf import NAME as NETCDF
@@ -246,56 +240,3 @@ def _csv(table: pd.DataFrame, path: Path, index: bool = True) -> None:
 
 def _issues(result: RunResult) -> pd.DataFrame:
     return pd.DataFrame(issue_rows(result.issues, "command"), columns=list(COLUMNS))
-
-
-DIGITS = "%.6g"
-
-
-def csv_text(table: pd.DataFrame, *, index: bool = True) -> str:
-    """What `table.to_csv(float_format="%.6g")` gives of a table `without_formulas`."""
-    check_finite(table)
-    table = without_formulas(table)
-    columns = [_entries(table.iloc[:, k]) for k in range(table.shape[1])]
-    names = list(map(str, table.columns))
-    if index:
-        columns.insert(0, ("%s", _rows(table.index)))
-        names.insert(0, "" if table.index.name is None else str(table.index.name))
-    if len(columns) == 1 and columns[0][0] == "%s":  # an empty line would be no row
-        columns = [("%s", [text or '""' for text in columns[0][1]])]
-    head = io.StringIO()
-    csv.writer(head, lineterminator="\n").writerow(names)
-    row = ",".join(form for form, _ in columns) + "\n"
-    entries = chain.from_iterable(zip(*(values for _, values in columns), strict=True))
-    return head.getvalue() + (row * len(table)) % tuple(entries)  # all at once, in C
-
-
-def _entries(values: pd.Series) -> tuple[str, list[Any]]:
-    """A column's entries, and how each is written."""
-    if values.dtype == bool:
-        return "%s", values.tolist()
-    if values.dtype.kind != "f":
-        return "%s", _lines(values.to_frame())
-    if not values.hasnans:
-        return DIGITS, values.tolist()
-    return "%s", ["" if value != value else DIGITS % value for value in values.tolist()]
-
-
-def _rows(index: pd.Index) -> list[str]:
-    """The entries of a table's index."""
-    if isinstance(index.dtype, np.dtype) and index.dtype.kind == "M":
-        return _times(index.to_numpy().tobytes(), index.dtype.str)
-    return _lines(index.to_frame())
-
-
-@lru_cache(maxsize=2)  # the tables of a run have one index
-def _times(values: bytes, dtype: str) -> list[str]:
-    """Times as entries, from the bytes of an array."""
-    return _lines(pd.DataFrame({"time": np.frombuffer(values, dtype=dtype)}))
-
-
-def _lines(column: pd.DataFrame) -> list[str]:
-    """A column of anything but numbers with a point, by pandas itself."""
-    # a second column, as pandas quotes an empty field that is alone; an end that no text holds
-    beside = column.assign(**{"": 0})
-    text = beside.to_csv(header=False, index=False, lineterminator="\0\n", float_format=DIGITS)
-    return text.split(",0\0\n")[:-1]

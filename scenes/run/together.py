@@ -6,7 +6,7 @@ import copy
 import shutil
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +15,13 @@ from bim.model import Space, seasons
 from bim.to_tracer import element_surfaces, orientation_groups, outdoors_of_rooms
 from mitsuba_cfs.bsdf.klems import KLEMS_FULL
 from mitsuba_cfs.errors import RoomError
-from mitsuba_cfs.matrices.cache import MatrixCache
+from mitsuba_cfs.matrices.cache import CacheEntry, MatrixCache
 from mitsuba_cfs.methods.phase_matrices import PhaseMatrices, matrices_together
 from mitsuba_cfs.methods.scene import DaylightScene
 from mitsuba_cfs.progress import Progress, silent
 from mitsuba_cfs.sky.annual import AnnualSky
 from mitsuba_cfs.sky.patches import ReinhartSky
+from mitsuba_cfs.surfaces import SharedOutdoors
 from scenes.inputs import Inputs
 from scenes.room.inputs import RoomInputs
 from scenes.room.light import visible_scene
@@ -82,10 +83,50 @@ class RoomsTogether:
             self._set = number
             if not (folder / TRACED).exists():
                 rooms = [one for one in self._spaces if self._set_of[one.guid] == number]
-                traced_together(self._inputs, rooms, self._skies, self._options, cache, progress=progress)
+                trace_ahead(self._inputs, rooms, self._skies, self._options, cache, progress=progress)
                 folder.mkdir(exist_ok=True)
                 (folder / TRACED).touch()
         return cache if self._options.cache else replace(cache, stores=False)
+
+
+@dataclass(frozen=True, slots=True)
+class _RecordedCache(MatrixCache):
+    """A cache that records the files it was asked for."""
+
+    paths: list[Path] = field(default_factory=list, compare=False, repr=False)
+
+    def entry(self, label: str, *inputs: object, by: str) -> CacheEntry:
+        """As of `MatrixCache`."""
+        entry = MatrixCache.entry(self, label, *inputs, by=by)
+        self.paths.append(entry.path)
+        return entry
+
+
+def trace_ahead(
+    inputs: Inputs,
+    spaces: Sequence[Space],
+    skies: AnnualSky,
+    options: JobOptions,
+    cache: MatrixCache,
+    *,
+    progress: Progress = silent,
+) -> None:
+    """Trace the matrices of rooms into a cache, unless all those of an earlier call are still there.
+
+    Of these only a list is read: to read them all takes as long as a quarter of a room's stages.
+    """
+    rooms = _scenes(inputs, spaces, skies, options)
+    some, outdoors = _traceable(inputs, spaces, rooms)
+    if len(some) < 2:
+        return
+    scenes = [rooms[i][1] for i in some]
+    sampling, five_phase = options.room.sampling, options.room.method != "three-phase"
+    listed = cache.entry("rooms together", sampling, five_phase, scenes, outdoors, by=PhaseMatrices.__module__)
+    if listed.read(lambda data: all((cache.folder / name).exists() for name in data["files"].tolist())):
+        return
+    recorded = _RecordedCache(cache.folder, cache.limit, cache.stores, cache.hashes)
+    matrices_together(scenes, outdoors, sampling, five_phase=five_phase, cache=recorded, progress=progress)
+    listed.write({"files": np.array(sorted({path.name for path in recorded.paths if path.exists()}))})
 
 
 def traced_together(
@@ -104,6 +145,27 @@ def traced_together(
 
     Args: cut: windows where the view outdoors differs.
     """
+    rooms = _scenes(inputs, spaces, skies, options)
+    some, outdoors = _traceable(inputs, spaces, rooms)
+    found: dict[int, PhaseMatrices] = {}
+    if len(some) > 1:
+        matrices = matrices_together(
+            [rooms[i][1] for i in some],
+            outdoors,
+            options.room.sampling,
+            five_phase=options.room.method != "three-phase",
+            cut=cut,
+            cache=cache,
+            progress=progress,
+        )
+        found = dict(zip(some, matrices, strict=True))
+    return [(room, scene, found.get(i)) for i, (room, scene) in enumerate(rooms)]
+
+
+def _scenes(
+    inputs: Inputs, spaces: Sequence[Space], skies: AnnualSky, options: JobOptions
+) -> list[tuple[RoomInputs, DaylightScene]]:
+    """The inputs and the scene of each room that has a place for sensors."""
     rooms: list[tuple[RoomInputs, DaylightScene]] = []
     for space in spaces:
         try:
@@ -120,6 +182,13 @@ def traced_together(
             rooms.append((room, visible_scene(room)))
         except RoomError:  # the room's stages say so
             continue
+    return rooms
+
+
+def _traceable(
+    inputs: Inputs, spaces: Sequence[Space], rooms: Sequence[tuple[RoomInputs, DaylightScene]]
+) -> tuple[list[int], SharedOutdoors]:
+    """Numbers of the rooms that can be traced together, and the outdoors of these."""
     windows = Counter(window.guid for space in spaces for window in space.windows)
     first = seasons(inputs.building)[0].building
     glossy = bool(element_surfaces(element for element in first.elements if element.gloss).glossy)
@@ -132,16 +201,4 @@ def traced_together(
         and len(scene.exterior.triangles)
         and bool(scene.exterior.glossy) == glossy
     ]
-    found: dict[int, PhaseMatrices] = {}
-    if len(some) > 1:
-        matrices = matrices_together(
-            [rooms[i][1] for i in some],
-            outdoors_of_rooms(first, [rooms[i][0].space for i in some]),
-            options.room.sampling,
-            five_phase=options.room.method != "three-phase",
-            cut=cut,
-            cache=cache,
-            progress=progress,
-        )
-        found = dict(zip(some, matrices, strict=True))
-    return [(room, scene, found.get(i)) for i, (room, scene) in enumerate(rooms)]
+    return some, outdoors_of_rooms(first, [rooms[i][0].space for i in some])

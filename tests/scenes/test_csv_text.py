@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from mitsuba_cfs.files import write_table
-from scenes.run.outputs import csv_text
+from scenes.run.csv_text import EXPONENTS, csv_text, six_digits
 
 TIMES = pd.date_range("2021-01-01 00:30", periods=6, freq="h", name="time")
 VALUES = [0.0, -1234567.0, 1.5e-7, np.nan, 1e30, 20.12345678]
@@ -49,3 +49,25 @@ def test_a_spreadsheet_computes_no_name(tmp_path):
         assert [row[1] for row in rows[1:]] == [row[0] for row in rows[1:]] == quoted
         assert {row[3] for row in rows[1:]} == {"-1.5"}
     assert table["room"].tolist() == names  # the caller's table stays
+
+
+def test_six_digits_are_those_of_a_format():
+    """Random numbers of all magnitudes, ties of the sixth digit, powers of ten and the numbers next to them."""
+    random = np.random.default_rng(1)
+    powers = 10.0 ** np.arange(-320, 308)
+    digits = random.integers(1, 10**7, 4000)
+    values = np.concatenate(
+        [
+            random.normal(size=4000) * 10.0 ** random.integers(-7, 9, 4000),
+            *(digits * 10.0**exponent for exponent in EXPONENTS),  # many end in 5, and many in 0
+            *(digits / 2**exponent for exponent in range(12)),  # ties without rounding
+            powers,
+            np.nextafter(powers, 0.0),
+            np.nextafter(powers, np.inf),
+            999999.5 * powers[300:340],
+            [0.0, np.nan],
+        ]
+    )
+    values = np.concatenate([values, -values])
+    written = [row[row != 0].tobytes().decode() for row in six_digits(values)]
+    assert written == ["" if value != value else f"{value:.6g}" for value in values.tolist()]

@@ -13,6 +13,7 @@ import pytest
 from bim.model import Element
 from mitsuba_cfs.errors import DataError
 from mitsuba_cfs.files import TEMPORARY
+from mitsuba_cfs.matrices.cache import MatrixCache
 from mitsuba_cfs.progress import silent
 from scenes import cli
 from scenes.commands.under_way import FirstPlanPage
@@ -120,7 +121,7 @@ def test_rooms_of_equal_shape_are_not_traced_ahead(two_rooms, tmp_path, monkeypa
     twin = moved(replace(BOX, spaces=(near,)), (20.0, 0.0, 0.0), "twin")
     traced: list[list[str]] = []
     monkeypatch.setattr(
-        together, "traced_together", lambda inputs, spaces, *_, **__: traced.append([space.name for space in spaces])
+        together, "trace_ahead", lambda inputs, spaces, *_, **__: traced.append([space.name for space in spaces])
     )
     rooms = together.RoomsTogether(inputs, [(near, twin), (far,)], None, options, tmp_path)
     assert rooms.cache_for(twin, silent) is None and not traced
@@ -132,7 +133,7 @@ def test_processes_trace_each_set_of_rooms_once(two_rooms, tmp_path, monkeypatch
     near, far = inputs.spaces
     traced: list[list[str]] = []
     monkeypatch.setattr(
-        together, "traced_together", lambda inputs, spaces, *_, **__: traced.append([space.name for space in spaces])
+        together, "trace_ahead", lambda inputs, spaces, *_, **__: traced.append([space.name for space in spaces])
     )
     rooms = together.RoomsTogether(inputs, [(near,), (far,)], None, options, tmp_path).for_processes()
     assert rooms.set_of(near.guid) == rooms.set_of(far.guid), "the second waits for the first"
@@ -238,3 +239,29 @@ def test_an_error_needs_matrices(tmp_path, capsys):
     words = ["run", str(OFFICE), "--weather", str(WEATHER), "--out", str(tmp_path / "out")]
     assert cli.run([*words, "--method", "point-in-time", "--error", "5%"]) == 2
     assert "--error needs --method three-phase or five-phase" in capsys.readouterr().err
+
+
+def test_matrices_of_rooms_that_are_all_there_are_not_read_again(two_rooms, tmp_path, monkeypatch):
+    inputs, options = two_rooms
+    traced: list[int] = []
+
+    def counted(scenes, *arguments, **choices):
+        traced.append(len(scenes))
+        return matrices_together(scenes, *arguments, **choices)
+
+    matrices_together = together.matrices_together
+    monkeypatch.setattr(together, "matrices_together", counted)
+    cache = MatrixCache(tmp_path)
+
+    def ahead(inputs):
+        together.trace_ahead(inputs, inputs.spaces, None, options, cache)
+
+    ahead(inputs)
+    ahead(inputs)
+    assert traced == [2]
+    elsewhere = replace(inputs.building.elements[0], triangles=WALL - np.array([0.0, 1.0, 0.0]))
+    ahead(replace(inputs, building=replace(inputs.building, elements=(elsewhere,))))
+    assert traced == [2, 2], "another building by the same files"
+    next(tmp_path.glob("*daylight*.npz")).unlink()
+    ahead(inputs)
+    assert traced[2:] == [2], "one of the matrices was trimmed"

@@ -129,3 +129,15 @@ def test_a_sky_is_of_subdivision_4_and_to_true_north_unless_asked():
     np.testing.assert_array_equal(sky.whole, annual_sky(year, 4, rotation_deg=0.0).whole)
     turned = annual_sky(year, 4, rotation_deg=0.01).whole
     assert np.abs(sky.whole - turned).max() > 0
+
+
+@pytest.mark.parametrize("patches", [2, 40])
+def test_the_sun_in_some_hours_as_products_take_it(sky, patches):
+    """Of few patches as it is, of many, which are dark but one, sparse [h, P]."""
+    sun = np.concatenate([sky.sun, np.zeros((patches - 2, 3))])
+    sky = replace(sky, sun=sun, whole=np.ones((patches, 3)))
+    for hours in ([0, 1, 2], [2, 0], []):
+        part = sky.lit_sun_in(np.array(hours, dtype=np.int64))
+        dense = part if isinstance(part, np.ndarray) else part.toarray().T
+        assert np.array_equal(dense, sun[:, hours])
+    assert isinstance(sky.lit_sun_in(np.array([1])), np.ndarray) == (patches == 2)
