@@ -72,7 +72,8 @@ RUNS = {
     "--error 5%": ["--error", "5%"],
 }
 ONE_CORE = ("taskset", "-c", "0")  # where no thread of Dr.Jit waits for work by polling, 10 ms after each launch
-OF_BEFORE = ("--quick, samples / 8", "--quick", "--quick, samples x 8")
+BEFORE = "cfs run, before"
+OF_BEFORE = ("--quick", "--quick, samples x 8")
 OURS_CONVERGED = [*PREVIEW, *_samples(64), "--seed", "7"]
 # variables of run.sh: method, rays of a sensor, of a window's direction, bounces
 RFLUXMTX = {
@@ -305,7 +306,7 @@ def curve(building: Building, *, before: Path | None = None, kept: bool = False)
     work: list[tuple[str, str, Callable[[Path], tuple[Light, float]]]] = []
     work += [("cfs run", name, partial(of_run, building, options)) for name, options in RUNS.items()]
     if before is not None:
-        work += [("cfs run, before", name, partial(of_before, building, before, RUNS[name])) for name in OF_BEFORE]
+        work += [(BEFORE, name, partial(of_before, building, before, RUNS[name])) for name in OF_BEFORE]
     work += [("rfluxmtx", name, partial(of_rfluxmtx, building, values)) for name, values in RFLUXMTX.items()]
     work += [("recipe", name, partial(of_recipe, building, recipe)) for name, recipe in RECIPES.items()]
     references = {
@@ -373,7 +374,7 @@ def draw(table: pd.DataFrame, path: Path) -> None:
         for program, rows in table.groupby("program", sort=False):
             by_time = rows.sort_values(measure)
             axes.plot(by_time[measure], by_time["error %"], "o-", label=program, markersize=4, linewidth=1)
-            for _, row in by_time.iterrows():
+            for _, row in by_time.iterrows() if program != BEFORE else ():  # as the points beside them
                 at, last = (row[measure], row["error %"]), row[measure] == table[measure].max()
                 side: dict[str, Any] = {"ha": "right", "xytext": (4, 5)} if last else {"xytext": (4, 4)}
                 axes.annotate(row["settings"], at, textcoords="offset points", fontsize=5.5, **side)
