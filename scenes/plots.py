@@ -39,7 +39,7 @@ def illuminance(year: RoomYear, axes: Axes | None = None) -> Axes:
 
 def glare(year: RoomYear, axes: Axes | None = None) -> Axes:
     """DGP of every hour where all were rated, else of the pictures, by day and hour."""
-    times = year.heat.temperatures.index
+    times, worst = year.heat.temperatures.index, _worst(year)
     if year.annual_glare is not None:
         axes = _carpet(times, year.annual_glare["dgp"].to_numpy(), "DGP", HIGHEST_DGP, axes)
     else:
@@ -47,13 +47,12 @@ def glare(year: RoomYear, axes: Axes | None = None) -> Axes:
         shown = sorted(year.glare.pictures, key=lambda picture: picture.hour)
         labels = [f"{times[picture.hour]:%d %b %H h}" for picture in shown]
         axes.bar(labels, [picture.glare["dgp"] for picture in shown], color="0.7")
-        axes.set_ylim(0.0, max(1.1 * (_worst(year) or 0.0), LIMITS[-1] + 0.05))
+        axes.set_ylim(0.0, max(1.1 * (worst or 0.0), LIMITS[-1] + 0.05))
         for limit, name in zip(LIMITS, CLASSES[1:], strict=True):
             axes.axhline(limit, color="tab:red", linewidth=0.8)
             axes.text(0.002, limit, name, transform=axes.get_yaxis_transform(), va="bottom")
         axes.tick_params(axis="x", rotation=45)
         axes.set_ylabel("DGP")
-    worst = _worst(year)
     axes.set_title(f"{year.space.label}: glare, {'no picture' if worst is None else f'at worst DGP {worst:.2f}'}")
     return axes
 

@@ -363,7 +363,7 @@ def states_of(light: PhaseLight, state: State | None) -> State:
 
 def sky_in(light: PhaseLight, hours: NDArray[np.int64]) -> NDArray[np.floating]:
     """The sky of some of its hours [P, h]; a year's is not copied."""
-    return light.sky.whole if all_hours(light, hours) else light.sky.whole[:, hours]
+    return light.sky.whole if light.sky.are_all(hours) else light.sky.whole[:, hours]
 
 
 def _without_direct_sun(light: PhaseLight, kind: Sequence[int], hours: NDArray[np.int64], some: slice) -> Array:
@@ -400,7 +400,7 @@ def in_place_of_sun(
     values = -phases.times_sky(by_sun, light.sky.lit_sun_in(hours))
     for one in chosen:
         if one.added is not None:
-            values += one.added[some] if all_hours(light, hours) else one.added[some][:, hours]
+            values += one.added[some] if light.sky.are_all(hours) else one.added[some][:, hours]
     outwards = reflected_shares(light.matrices, light.optics(kind)).outwards
     if outwards is not None and light.reflected is not None:
         values += replaced_before(light.reflected, outwards[some], hours)
@@ -530,8 +530,3 @@ def _in_states(values: Sequence[Array | None], row: NDArray[np.int64]) -> Array:
     for j, one in enumerate(states):
         chosen[:, row == j] = one[:, row == j]
     return chosen
-
-
-def all_hours(light: PhaseLight, hours: NDArray[np.int64]) -> bool:
-    """Whether some hours are those of the sky, in their order."""
-    return np.array_equal(hours, np.arange(len(light.sky.lit)))

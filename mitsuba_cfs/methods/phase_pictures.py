@@ -20,7 +20,7 @@ from mitsuba_cfs.glare.sun_disc import SunDisc
 from mitsuba_cfs.images.view import View
 from mitsuba_cfs.methods.coefficients import direct_daylight, direct_transmittance
 from mitsuba_cfs.methods.optics import SystemOptics, combinations, in_state
-from mitsuba_cfs.methods.phase_light import PhaseLight, WindowLight, all_hours, sky_in, window_light, with_reflected_sun
+from mitsuba_cfs.methods.phase_light import PhaseLight, WindowLight, sky_in, window_light, with_reflected_sun
 from mitsuba_cfs.methods.phase_matrices import (
     PhaseMatrices,
     few_pictures,
@@ -174,7 +174,7 @@ def _shared_by_hours(
 
 def _windows(light: PhaseLight, hours: NDArray[np.int64], state: Sequence[int]) -> list[WindowLight]:
     """The luminance of each window part [Q] in some hours."""
-    sky = light.sky if all_hours(light, hours) else light.sky.part(hours)
+    sky = light.sky if light.sky.are_all(hours) else light.sky.part(hours)
     optics = light.optics(state)
     return [window_light(light.matrices, q, one, sky) for q, one in enumerate(optics)]
 

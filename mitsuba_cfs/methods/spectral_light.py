@@ -50,7 +50,6 @@ from mitsuba_cfs.methods.optics import States, SystemOptics, combinations, neigh
 from mitsuba_cfs.methods.phase_light import (
     PhaseLight,
     SensorLight,
-    all_hours,
     direct_sun,
     direct_sun_of_all,
     in_place_of_sun,
@@ -276,7 +275,7 @@ class _Season:
             np.array(coefficients),
             np.array(by_sun),
             np.array(direct) if direct else None,
-            amount if all_hours(self._light, hours) else amount[..., hours],
+            amount if self._light.sky.are_all(hours) else amount[..., hours],
             sky.ground_luminance[hours],
             self._shares,
             self._components,

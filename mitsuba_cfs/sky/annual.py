@@ -197,10 +197,14 @@ class AnnualSky:
             self._lit_sun.append(lit_rows(self.sun))
         return self._lit_sun[0]
 
+    def are_all(self, hours: NDArray[np.int64]) -> bool:
+        """Whether some of the hours L are all of them, in their order."""
+        return np.array_equal(hours, np.arange(len(self.lit)))
+
     def lit_sun_in(self, hours: NDArray[np.int64]) -> NDArray[np.floating] | csr_array:
         """The same in some of the hours L."""
         sun = self.lit_sun
-        if np.array_equal(hours, np.arange(len(self.lit))):
+        if self.are_all(hours):
             return sun
         return sun[:, hours] if isinstance(sun, np.ndarray) else sun[hours]
 

@@ -114,7 +114,7 @@ def study_to_folder(
     if parsed.quick:
         click.echo(quick_run.NOTE)
     plan = settled(parsed, plan_of(parsed))
-    pages = StudyPage(store, plan, page_options.language)
+    pages = StudyPage(store.results, plan, page_options.language)
     chosen: dict[int, Case] = {}
     head = PrintedHead()
     processes = processes_for(len(plan.cases), processes)
@@ -129,6 +129,7 @@ def study_to_folder(
             scheduler=scheduler,
             progress=progress,
             on_case=partial(_ready_case, pages),
+            on_reused=pages.reused,
             on_head=head,
         )
         nothing = result.failed == len(result.results)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from scenes.results import RoomYear
     from scenes.run.first_plan import PlannedRoom
     from scenes.study.plan import Case, StudyPlan
-    from scenes.study.store import CaseResult, Store
+    from scenes.study.store import CaseResult
 
 
 class RefreshedPage:
@@ -75,11 +75,13 @@ class FirstPlanPage:
 class StudyPage:
     """Writes the cases of a study in the place of its report as they come."""
 
-    def __init__(self, store: Store, plan: StudyPlan, language: str) -> None:
-        """Args: store: whose finished cases are on the page."""
-        self._page, self._plan = RefreshedPage(store.results, language), plan
-        kept = {case.key: store.load(case.key) for case in plan.cases}
-        self._ready = {key: replace(result, arrays={}) for key, result in kept.items() if result is not None}
+    def __init__(self, folder: ResultFolder, plan: StudyPlan, language: str) -> None:
+        self._page, self._plan = RefreshedPage(folder, language), plan
+        self._ready: dict[str, CaseResult] = {}
+
+    def reused(self, results: Mapping[str, CaseResult]) -> None:
+        """Add cases of an earlier run, by key; they are written with the next that is ready."""
+        self._ready |= {key: replace(result, arrays={}) for key, result in results.items()}
 
     def __call__(self, case: Case, result: CaseResult) -> None:
         """Add a case that is ready."""

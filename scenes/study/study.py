@@ -105,6 +105,9 @@ class StudyResult:
         return rows
 
 
+OnReused = Callable[[Mapping[str, CaseResult]], None]
+
+
 def run_study(
     study: Study,
     store: Store | str | PathLike[str],
@@ -115,6 +118,7 @@ def run_study(
     compute: Compute = compute_case,
     progress: Progress = silent,
     on_case: Callable[[Case, CaseResult, int, int], None] | None = None,
+    on_reused: OnReused = lambda results: None,
     on_head: Callable[[Head], None] = lambda head: None,
 ) -> StudyResult:
     """Compute what the folder does not have yet; `write_study` writes what comes of it.
@@ -126,6 +130,7 @@ def run_study(
         plan: of the study, with the methods that `auto` chose; made here by default.
         processes, scheduler: see `scenes.study.store.computed`.
         on_case: called with each case that is ready, how many are, and of how many.
+        on_reused: called before with the finished cases that the folder has, by key.
         on_head: called with what was left out and assumed, before anything is computed.
     """
     start = time.monotonic()
@@ -135,7 +140,14 @@ def run_study(
     if not isinstance(store, Store):
         store = Store(Path(store), inputs=study.files)
     finished, reused = finished_cases(
-        plan.cases, store, processes=processes, scheduler=scheduler, compute=compute, progress=progress, on_case=on_case
+        plan.cases,
+        store,
+        processes=processes,
+        scheduler=scheduler,
+        compute=compute,
+        progress=progress,
+        on_case=on_case,
+        on_reused=on_reused,
     )
     results = tuple(finished[case.key] for case in plan.cases)
     seconds = round(time.monotonic() - start, 3)
@@ -151,6 +163,7 @@ def finished_cases(
     compute: Compute = compute_case,
     progress: Progress = silent,
     on_case: Callable[[Case, CaseResult, int, int], None] | None = None,
+    on_reused: OnReused = lambda results: None,
 ) -> tuple[dict[str, CaseResult], int]:
     """The result of each case by its key, computed where the folder does not have it, and kept.
 
@@ -162,6 +175,7 @@ def finished_cases(
     cases = {case.key: case for case in every}
     finished = {key: result for key in cases if (result := store.load(key)) is not None}
     reused, total = len(finished), len(cases)
+    on_reused(finished)
 
     def under_way(stage: str = "", fraction: float = 0.0) -> None:
         progress(Stage(stage, "case", min(len(finished) + 1, total), total), fraction)

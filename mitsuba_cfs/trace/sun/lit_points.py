@@ -325,14 +325,14 @@ class _GridLight:
         light, own, differ = self._between_nodes(at, rows, paths.start)
         lane = np.flatnonzero(own)
         pair = rows[lane // h] * h + lane % h
-        alike = [self._pairs_with_rays(path, np.flatnonzero(~one)) for path, one in zip(paths, reached, strict=True)]
-        others = np.concatenate(alike)
+        agreed = [self._pairs_with_rays(path, np.flatnonzero(~one)) for path, one in zip(paths, reached, strict=True)]
+        others = np.concatenate(agreed)
         before = np.append(light[lane], np.zeros(len(others), dtype=np.float32))
         unlike = np.append(differ[lane], np.zeros(len(others), dtype=bool))
         exact = self._by_rays(np.append(pair, others), unlike, before)
         light[lane], exact = exact[: len(lane)], exact[len(lane) :]
         light, flat = light.reshape(len(rows), h), total.reshape(-1)
-        for path, one, pairs in zip(paths, reached, alike, strict=True):
+        for path, one, pairs in zip(paths, reached, agreed, strict=True):
             count = np.count_nonzero(one)
             total[slice(None) if count == m else one] += light[:count]
             flat[pairs - path * m * h] += exact[: len(pairs)]
@@ -395,7 +395,7 @@ class _GridLight:
         return (dr.abs(cosine) <= SPREAD) | ((cosine > 0) & (differ | checked))
 
     def _pairs_with_rays(self, path: int, places: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Numbers of the pairs of a path and some places that have a ray though their nodes are alike.
+        """Numbers of the pairs of a path and some places that have a ray though their nodes agree.
 
         And a few others.
         """
